@@ -1,0 +1,53 @@
+// What a constraint kind is: a scalar function of a few points.
+#pragma once
+#include <concepts>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "penalty/math/types.h"
+
+namespace penalty {
+
+/// A scalar C(p_0 .. p_{n-1}) that is zero at rest: dimensionless for lengths, areas and volumes, in radians for angles,
+/// so that its stiffness K is an energy in joules for every kind. A kind is a small value type; it never sees K, an
+/// index or a mass. `at_rest(points)` makes one that is zero at the given points.
+template <class Kind>
+concept Constraint = requires(const Kind c, const Points<Kind::num_points>& p) {
+  { Kind::name } -> std::convertible_to<std::string_view>;
+  { c.value(p) } -> std::same_as<Real>;
+  { c.gradient(p) } -> std::convertible_to<Gradient<Kind::num_points>>;
+};
+
+/// A kind may give its second derivative; without it the stiffness is Gauss-Newton's.
+template <class Kind>
+concept HasHessian = Constraint<Kind> && requires(const Kind c, const Points<Kind::num_points>& p) {
+  { c.hessian(p) } -> std::convertible_to<Hessian<Kind::num_points>>;
+};
+
+/// A kind may give value and gradient in one pass, where they share work: the kernel of every step.
+template <class Kind>
+concept HasValueAndGradient =
+    Constraint<Kind> && requires(const Kind c, const Points<Kind::num_points>& p, Gradient<Kind::num_points>& g) {
+      { c.value_and_gradient(p, g) } -> std::same_as<Real>;
+    };
+
+/// C and dC/dp at once; `gradient` is overwritten.
+template <Constraint Kind>
+Real value_and_gradient(const Kind& kind, const Points<Kind::num_points>& points,
+                        Gradient<Kind::num_points>& gradient) {
+  if constexpr (HasValueAndGradient<Kind>) {
+    return kind.value_and_gradient(points, gradient);
+  } else {
+    gradient = kind.gradient(points);
+    return kind.value(points);
+  }
+}
+
+/// Throws std::invalid_argument "<kind>: <what> is <value>" unless |value| > 0 and finite: a rest value that C is divided by.
+inline void require_rest_value(std::string_view kind, std::string_view what, Real value) {
+  if (!(value < 0 || value > 0) || value - value != 0)
+    throw std::invalid_argument(std::string(kind) + ": " + std::string(what) + " is " + std::to_string(value));
+}
+
+}  // namespace penalty

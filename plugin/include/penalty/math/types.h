@@ -1,0 +1,40 @@
+// Shapes of points, gradients and Hessians of a constraint, and the packed arrays that the solvers step over.
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace penalty {
+
+using Real = double;  // the mathematics is double; btScalar stays in bullet/
+using Vector3 = Eigen::Matrix<Real, 3, 1>;
+using Matrix3 = Eigen::Matrix<Real, 3, 3>;
+
+template <int N>
+using Points = Eigen::Matrix<Real, 3, N>;  // column i = p_i [m]
+template <int N>
+using Gradient = Eigen::Matrix<Real, 3, N>;  // column i = dC/dp_i
+template <int N>
+using Hessian = Eigen::Matrix<Real, 3 * N, 3 * N>;  // block (i, j) = d²C / dp_i dp_j
+
+/// One vector a particle, padded to four reals (the last is zero) so that a particle is one aligned load; column i
+/// belongs to particle i.
+using PackedVectors = Eigen::Matrix<Real, 4, Eigen::Dynamic>;
+using Positions = Eigen::Ref<const PackedVectors>;  // [m]
+using Vectors = Eigen::Ref<const PackedVectors>;    // velocities [m/s], displacements [m]
+using Forces = Eigen::Ref<PackedVectors>;           // [N]
+
+/// `vectors` is 3 x P.
+inline PackedVectors pack(const Eigen::Matrix<Real, 3, Eigen::Dynamic>& vectors) {
+  PackedVectors packed = PackedVectors::Zero(4, vectors.cols());
+  packed.topRows<3>() = vectors;
+  return packed;
+}
+
+/// The cross-product matrix: cross_matrix(a) * b = a x b.
+inline Matrix3 cross_matrix(const Vector3& a) {
+  Matrix3 m;
+  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return m;
+}
+
+}  // namespace penalty
