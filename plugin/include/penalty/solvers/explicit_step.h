@@ -1,0 +1,81 @@
+// One world step as many explicit substeps: kick, contacts, drift.
+#pragma once
+#include <limits>
+#include <span>
+
+#include "penalty/assembly/potential.h"
+#include "penalty/solvers/contact.h"
+
+namespace penalty {
+
+/// How a body is stepped. The defaults keep energy; `damping_time` and `drag` take it away.
+struct StepOptions {
+  Real damping_time = 0;         // ratio of damping to stiffness along the constraint gradients, beta [s]
+  Real drag = 0;                 // rate at which all velocities decay [1/s]; does not keep momentum
+  int substeps = 0;              // in a step; 0: from the stability limit
+  Real safety = 0.99;            // share of the stability limit that a substep may use, in (0, 1]
+  Real contact_safety = 0.7;     // the same while the body is in contact: impacts excite the fastest modes
+  Real energy_tolerance = 0.005; // relative growth of energy in a step above which it is repeated with more substeps
+  int max_substeps = 20000;      // beyond this a step is taken as it is, if it is finite
+  Real contact_slop = 1e-4;      // depth that is left alone [m]
+
+  /// Throws std::invalid_argument that names the option and its value.
+  void check() const;
+};
+
+/// What a step did.
+struct StepReport {
+  int substeps = 0;               // of the step that was kept
+  int retries = 0;                // by the energy guard
+  bool finite = true;             // false: the step was undone, the state is that of its start
+  int first_bad_particle = -1;    // when not finite
+  Real elastic_energy = 0;        // at the end [J]
+  Real kinetic_energy = 0;        // at the end, without rigid bodies [J]
+  Real contact_depth = 0;         // largest depth below a contact plane [m]
+  int num_contacts = 0;           // contacts that were considered
+};
+
+/// One body of an island: its state, its potential and what the integrator remembers of it between steps. The potential
+/// outlives the body.
+struct SteppedBody {
+  Particles particles;
+  const Potential* potential = nullptr;
+  StepOptions options;
+  Vector3 gravity = Vector3::Zero();  // [m/s²]
+  PackedVectors external_forces;      // constant over the step [N]; empty: none
+  Real largest_eigenvalue = 0;        // of M^-1 K at rest, an upper bound [1/s²]: see estimate_stability
+  std::vector<Contact> contacts;      // of this step
+  StepReport report;                  // of the last step
+
+  /// Forgets what was computed at earlier positions: call after changing positions, external forces or the potential.
+  void positions_changed() { forces_valid = false; }
+
+  // What the integrator keeps between steps.
+  PackedVectors forces;  // at `particles.positions`, external ones included [N]
+  Real elastic_energy = 0;
+  bool forces_valid = false;
+  int last_substeps = 0;       // what the energy guard settled on
+  Real mass = 0;               // of the particles that are not pinned [kg]
+  Real energy_noise = 0;       // growth of energy that means nothing [J]
+  Particles start;             // positions and velocities to go back to
+};
+
+/// Sets `largest_eigenvalue` from the stiffness at the rest positions. Call once, and after a change of masses, stiffness or
+/// elements.
+void estimate_stability(SteppedBody& body, const Positions& rest_positions);
+
+/// Advances bodies that touch the same rigid bodies over `duration` [s], together with these rigid bodies, in equal
+/// substeps: velocity Verlet (kick, drift, kick), with one sweep of contacts before each drift. At the start and the end
+/// positions and velocities belong to the same instant, and only there, or at the end of a block of substeps, is damping
+/// applied: touched half a substep apart, it would feed the fastest modes.
+///
+/// The number of substeps follows from the stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That
+/// limit belongs to the rest shape; far from it a step may still gain energy. If kinetic + elastic energy, less the work
+/// of gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
+/// many substeps again; the next step starts from at least 0.8 of that number.
+///
+/// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off. A step that cannot be made
+/// finite is undone and reported, never handed on.
+void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration);
+
+}  // namespace penalty
