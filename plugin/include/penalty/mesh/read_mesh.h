@@ -1,0 +1,25 @@
+// Reads tetrahedral meshes: VTK legacy, Gmsh, TetGen.
+#pragma once
+#include <filesystem>
+
+#include "penalty/mesh/tet_mesh.h"
+
+namespace penalty {
+
+/// True for the names that `read_mesh` takes: .vtk, .msh, .node, .ele in any case, and a stem without extension beside
+/// which a .node and an .ele file lie. Does not open the file.
+bool is_tetrahedral_mesh_file(const std::filesystem::path& path);
+
+/// Reads by extension:
+///   .vtk         legacy UNSTRUCTURED_GRID, ASCII or BINARY, file versions 1 to 5.1.
+///   .msh         Gmsh 2.x and 4.1, ASCII; node tags may be sparse.
+///   .node, .ele  TetGen; the other file of the pair is found by name, and the common stem does too. Points carry any
+///                numbers, as a rule from 0 or 1.
+/// Tetrahedra are taken, of higher-order ones the corners; points, lines and faces are skipped; other solid elements
+/// are refused.
+/// Coordinates are metres. Numbers are read the same way in every locale. Memory is bounded by the size of the file,
+/// whatever its header claims. The mesh has gone through `repair`.
+/// Throws MeshError with one line for everything that is wrong with the file, std::bad_alloc for lack of memory.
+TetMesh read_mesh(const std::filesystem::path& path);
+
+}  // namespace penalty

@@ -1,0 +1,261 @@
+#include "penalty/mesh/builders.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <unordered_map>
+
+#include "mesh_text.h"
+
+namespace penalty {
+namespace {
+
+void require_length(Real value, const std::string& name) {
+  if (!(value > 0) || value > largest_coordinate)
+    throw std::invalid_argument(name + " is " + to_text(value) + ", not a positive finite length");
+}
+
+void require_count(int value, int least, int most, const std::string& name) {
+  if (value < least || value > most)
+    throw std::invalid_argument(name + " is " + std::to_string(value) + ", not between " + std::to_string(least) +
+                                " and " + std::to_string(most));
+}
+
+std::string call(const std::string& name, std::initializer_list<std::string> arguments) {
+  std::string text = name + "(";
+  for (const std::string& argument : arguments) text += (text.back() == '(' ? "" : ", ") + argument;
+  return text + ")";
+}
+
+// The five tetrahedra of a cell. Corner b lies at (b & 1, b >> 1 & 1, b >> 2 & 1). The first is the regular one in the
+// middle, the others cut a corner off; `odd` is the mirror image of `even`.
+//
+//        6-------7
+//       /|      /|      even: the diagonals of the faces join 0, 3, 5, 6
+//      4-------5 |      odd:  they join 1, 2, 4, 7
+//      | 2-----|-3
+//      |/      |/
+//      0-------1
+constexpr Tetrahedron even[5] = {{0, 3, 6, 5}, {1, 0, 5, 3}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}};
+constexpr Tetrahedron odd[5] = {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}};
+
+// The faces of a regular icosahedron about the origin: corner indices, counter-clockwise seen from outside.
+struct Icosahedron {
+  std::array<Vector3, 12> corners;
+  std::vector<Triangle> faces;
+
+  Icosahedron() {
+    std::size_t count = 0;
+    for (Real one : {-1.0, 1.0})
+      for (Real golden : {-std::numbers::phi, std::numbers::phi})
+        for (const Vector3& corner : {Vector3(0, one, golden), Vector3(one, golden, 0), Vector3(golden, 0, one)})
+          corners[count++] = corner.normalized();
+    const auto joined = [this](int a, int b) { return corners[a].dot(corners[b]) > 0.4; };  // 1/sqrt(5) along an edge
+    for (int a = 0; a < 12; ++a)
+      for (int b = a + 1; b < 12; ++b)
+        for (int c = b + 1; c < 12; ++c)
+          if (joined(a, b) && joined(b, c) && joined(a, c)) {
+            const bool outward = corners[a].dot(corners[b].cross(corners[c])) > 0;
+            faces.push_back(outward ? Triangle{a, b, c} : Triangle{a, c, b});
+          }
+  }
+};
+
+// Vertices of the ball, each made once although up to five faces of the icosahedron share it: a vertex is known by the
+// corners it lies between and their weights.
+class BallVertices {
+ public:
+  BallVertices(const Icosahedron& icosahedron, Real radius, int layers)
+      : icosahedron_(icosahedron), radius_(radius), layers_(layers) {}
+
+  // Weights are whole numbers; their sum is the layer.
+  int at(const Triangle& face, const std::array<int, 3>& weights) {
+    std::array<std::uint64_t, 3> parts;
+    for (int k = 0; k < 3; ++k)
+      parts[k] =
+          weights[k] == 0 ? 0 : static_cast<std::uint64_t>(face[k] + 1) << 8 | static_cast<std::uint64_t>(weights[k]);
+    std::sort(parts.begin(), parts.end());
+    const std::uint64_t key = parts[0] << 32 | parts[1] << 16 | parts[2];
+    const auto [entry, is_new] = index_.try_emplace(key, static_cast<int>(positions_.size()));
+    if (is_new) positions_.push_back(position(face, weights));
+    return entry->second;
+  }
+
+  const std::vector<Vector3>& positions() const { return positions_; }
+
+ private:
+  // Sines instead of the weights themselves keep the spacing along the edges of the icosahedron even.
+  Vector3 position(const Triangle& face, const std::array<int, 3>& weights) const {
+    const int layer = weights[0] + weights[1] + weights[2];
+    if (layer == 0) return Vector3::Zero();
+    const Real edge_angle = std::atan(Real{2});
+    Vector3 direction = Vector3::Zero();
+    for (int k = 0; k < 3; ++k) direction += std::sin(edge_angle * weights[k] / layer) * icosahedron_.corners[face[k]];
+    return radius_ * layer / layers_ * direction.normalized();
+  }
+
+  const Icosahedron& icosahedron_;
+  Real radius_;
+  int layers_;
+  std::unordered_map<std::uint64_t, int> index_;
+  std::vector<Vector3> positions_;
+};
+
+Eigen::Matrix3Xd columns(const std::vector<Vector3>& positions) {
+  Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(positions.size()));
+  for (std::size_t i = 0; i < positions.size(); ++i) matrix.col(static_cast<Eigen::Index>(i)) = positions[i];
+  return matrix;
+}
+
+// The builders know the orientation of what they build up to sign: no repair is worth reporting.
+TetMesh finished(TetMesh mesh) {
+  repair(mesh);
+  mesh.repairs = {};
+  return mesh;
+}
+
+// A disc of triangles in rings about its middle, a triangular lattice bent round. Its vertices have three colours, so
+// that each triangle has one vertex of each.
+struct Disc {
+  std::vector<std::array<Real, 2>> points;  // in the unit disc
+  std::vector<int> colours;
+  std::vector<Triangle> triangles;
+
+  explicit Disc(int layers) {
+    points.push_back({0, 0});
+    colours.push_back(0);
+    for (int ring = 1; ring <= layers; ++ring)
+      for (int k = 0; k < 6 * ring; ++k) {
+        const Real angle = 2 * std::numbers::pi * k / (6 * ring), radius = Real(ring) / layers;
+        points.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+        // Along side s of the hexagon the lattice coordinates run from the corner by steps of one colour; the corners
+        // of a ring alternate between +ring and -ring, modulo 3.
+        const int side = k / ring, step = k % ring;
+        const int colour = side % 2 == 0 ? ring + step : 2 * ring + 2 * step;
+        colours.push_back(colour % 3);
+      }
+    const auto at = [](int ring, int k) { return ring == 0 ? 0 : 1 + 3 * ring * (ring - 1) + k % (6 * ring); };
+    for (int ring = 1; ring <= layers; ++ring)
+      for (int side = 0; side < 6; ++side)
+        for (int k = 0; k < ring; ++k) {
+          const int outer = side * ring + k, inner = side * (ring - 1) + k;
+          triangles.push_back({at(ring, outer), at(ring, outer + 1), at(ring - 1, inner)});
+          if (k + 1 < ring) triangles.push_back({at(ring, outer + 1), at(ring - 1, inner + 1), at(ring - 1, inner)});
+        }
+  }
+};
+
+}  // namespace
+
+TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells) {
+  constexpr int most_cells = 100'000'000;
+  std::int64_t total = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name(1, "xyz"[axis]);
+    require_length(size[axis], "make_box: size." + name);
+    require_count(cells[axis], 1, most_cells, "make_box: cells." + name);
+    total *= cells[axis];
+    if (total > most_cells)
+      throw std::invalid_argument("make_box: cells are more than " + std::to_string(most_cells) + " together");
+  }
+  std::array<int, 3> order{0, 1, 2};  // slowest direction first
+  std::stable_sort(order.begin(), order.end(), [&](int l, int r) { return cells[l] > cells[r]; });
+  std::array<int, 3> stride;
+  stride[order[2]] = 1;
+  stride[order[1]] = cells[order[2]] + 1;
+  stride[order[0]] = stride[order[1]] * (cells[order[1]] + 1);
+
+  TetMesh mesh;
+  mesh.source = call("make_box", {to_text(size.x()), to_text(size.y()), to_text(size.z()), std::to_string(cells[0]),
+                                  std::to_string(cells[1]), std::to_string(cells[2])});
+  mesh.vertices.resize(3, Eigen::Index{cells[0] + 1} * (cells[1] + 1) * (cells[2] + 1));
+  mesh.tetrahedra.reserve(static_cast<std::size_t>(5 * total));
+  std::array<int, 3> at;  // of the cell's or vertex's lowest corner
+  const auto index = [&](int b) {
+    return (at[0] + (b & 1)) * stride[0] + (at[1] + (b >> 1 & 1)) * stride[1] + (at[2] + (b >> 2 & 1)) * stride[2];
+  };
+  for (at[order[0]] = 0; at[order[0]] <= cells[order[0]]; ++at[order[0]])
+    for (at[order[1]] = 0; at[order[1]] <= cells[order[1]]; ++at[order[1]])
+      for (at[order[2]] = 0; at[order[2]] <= cells[order[2]]; ++at[order[2]]) {
+        for (int axis = 0; axis < 3; ++axis) mesh.vertices(axis, index(0)) = size[axis] * at[axis] / cells[axis];
+        if (at[0] == cells[0] || at[1] == cells[1] || at[2] == cells[2]) continue;
+        for (const Tetrahedron& t : (at[0] + at[1] + at[2]) % 2 == 0 ? even : odd)
+          mesh.tetrahedra.push_back({index(t[0]), index(t[1]), index(t[2]), index(t[3])});
+      }
+  return finished(std::move(mesh));
+}
+
+TetMesh make_beam(int cells_across) {
+  require_count(cells_across, 1, 200, "make_beam: cells_across");
+  TetMesh mesh = make_box({4, 1, 1}, {4 * cells_across, cells_across, cells_across});
+  mesh.source = call("make_beam", {std::to_string(cells_across)});
+  return mesh;
+}
+
+TetMesh make_ball(Real radius, int layers) {
+  require_length(radius, "make_ball: radius");
+  require_count(layers, 1, 100, "make_ball: layers");
+  const Icosahedron icosahedron;
+  BallVertices vertices(icosahedron, radius, layers);
+  TetMesh mesh;
+  mesh.source = call("make_ball", {to_text(radius), std::to_string(layers)});
+  // The tetrahedron between the centre and a face is the corner n >= x >= y >= z >= 0 of a grid of cubes, x the layer;
+  // of the six tetrahedra along the diagonal of each cube those inside are taken.
+  constexpr std::array<std::array<int, 3>, 6> paths{{{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
+  for (int x = 0; x < layers; ++x)  // layer by layer: neighbours in space are at most one layer apart in memory
+    for (const Triangle& face : icosahedron.faces)
+      for (int y = 0; y <= x; ++y)
+        for (int z = 0; z <= y; ++z)
+          for (const auto& path : paths) {
+            std::array<int, 3> p{x, y, z};
+            Tetrahedron t;
+            bool inside = true;
+            for (int k = 0; k < 4 && inside; ++k) {
+              if (k > 0) ++p[path[k - 1]];
+              inside = p[0] >= p[1] && p[1] >= p[2];
+              if (inside) t[k] = vertices.at(face, {p[0] - p[1], p[1] - p[2], p[2]});
+            }
+            if (inside) mesh.tetrahedra.push_back(t);
+          }
+  mesh.vertices = columns(vertices.positions());
+  return finished(std::move(mesh));
+}
+
+TetMesh make_torus(Real major_radius, Real minor_radius, int layers, int segments) {
+  require_length(major_radius, "make_torus: major_radius");
+  require_length(minor_radius, "make_torus: minor_radius");
+  if (!(minor_radius < major_radius))
+    throw std::invalid_argument("make_torus: minor_radius is " + to_text(minor_radius) + ", not below major_radius " +
+                                to_text(major_radius));
+  require_count(layers, 1, 200, "make_torus: layers");
+  require_count(segments, 3, 100'000, "make_torus: segments");
+  const Disc disc(layers);
+  const int slice = static_cast<int>(disc.points.size());
+  if (Real(disc.triangles.size()) * 3 * segments > 1e8)
+    throw std::invalid_argument("make_torus: layers " + std::to_string(layers) + " and segments " +
+                                std::to_string(segments) + " give more than 10^8 tetrahedra");
+
+  TetMesh mesh;
+  mesh.source = call("make_torus",
+                     {to_text(major_radius), to_text(minor_radius), std::to_string(layers), std::to_string(segments)});
+  mesh.vertices.resize(3, Eigen::Index{slice} * segments);
+  for (int s = 0; s < segments; ++s)
+    for (int v = 0; v < slice; ++v) {
+      const auto [x, y] = disc.points[v];
+      // Columns of the three colours are shifted by thirds of a segment: four consecutive vertices round three
+      // neighbouring columns are then a tetrahedron close to those of a body-centred cubic lattice.
+      const Real angle = 2 * std::numbers::pi * (s + disc.colours[v] / 3.0) / segments;
+      const Real distance = major_radius + minor_radius * x;
+      mesh.vertices.col(Eigen::Index{s} * slice + v) << distance * std::cos(angle), minor_radius * y,
+          distance * std::sin(angle);
+    }
+  for (int s = 0; s < segments; ++s)
+    for (Triangle column : disc.triangles) {
+      std::sort(column.begin(), column.end(), [&](int l, int r) { return disc.colours[l] < disc.colours[r]; });
+      const auto rung = [&](int k) { return (s + k / 3) % segments * slice + column[k % 3]; };
+      for (int k = 0; k < 3; ++k) mesh.tetrahedra.push_back({rung(k), rung(k + 1), rung(k + 2), rung(k + 3)});
+    }
+  return finished(std::move(mesh));
+}
+
+}  // namespace penalty

@@ -1,0 +1,156 @@
+#include "penalty/mesh/tet_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "mesh_text.h"
+
+namespace penalty {
+namespace {
+
+// Words a complaint and throws the exception that suits where the mesh comes from.
+class Complaint {
+ public:
+  Complaint(const TetMesh& mesh, const MeshOrigin* origin) : mesh_(mesh), origin_(origin) {}
+
+  std::string vertex_name(int vertex) const {
+    return "vertex " + tag(vertex, origin_ ? &origin_->vertex_tags : nullptr);
+  }
+  std::string tetrahedron_name(std::size_t t) const {
+    return "tetrahedron " + tag(t, origin_ ? &origin_->tetrahedron_tags : nullptr);
+  }
+  int tetrahedron_line(std::size_t t) const {
+    return origin_ && t < origin_->tetrahedron_lines.size() ? origin_->tetrahedron_lines[t] : 0;
+  }
+
+  [[noreturn]] void about_vertex(int vertex, const std::string& text) const {
+    const auto v = static_cast<std::size_t>(vertex);
+    const int line = origin_ && v < origin_->vertex_lines.size() ? origin_->vertex_lines[v] : 0;
+    fail(origin_ ? origin_->vertex_file : "", line, vertex_name(vertex) + ": " + text);
+  }
+  [[noreturn]] void about_tetrahedron(std::size_t t, const std::string& text) const {
+    fail(origin_ ? origin_->tetrahedron_file : "", tetrahedron_line(t), tetrahedron_name(t) + ": " + text);
+  }
+  [[noreturn]] void about_mesh(const std::string& text) const {
+    fail(origin_ ? origin_->tetrahedron_file : "", 0, text);
+  }
+
+ private:
+  static std::string tag(std::size_t index, const std::vector<std::int64_t>* tags) {
+    return tags && index < tags->size() ? std::to_string((*tags)[index]) : std::to_string(index);
+  }
+  [[noreturn]] void fail(const std::string& file, int line, const std::string& text) const {
+    std::string message = file.empty() ? (mesh_.source.empty() ? "mesh" : mesh_.source) : file;
+    if (line > 0) message += ":" + std::to_string(line);
+    message += ": " + text;
+    if (origin_) throw MeshError(message);
+    throw std::invalid_argument(message);
+  }
+
+  const TetMesh& mesh_;
+  const MeshOrigin* origin_;
+};
+
+void check_vertices(const TetMesh& mesh, const Complaint& complaint) {
+  if (mesh.vertices.cols() > std::numeric_limits<int>::max())
+    complaint.about_mesh("more vertices than an int can count");
+  for (int v = 0; v < mesh.vertices.cols(); ++v)
+    for (int axis = 0; axis < 3; ++axis) {
+      const Real x = mesh.vertices(axis, v);
+      if (!std::isfinite(x)) complaint.about_vertex(v, std::string("coordinate ") + "xyz"[axis] + " is " + to_text(x));
+      if (std::abs(x) > largest_coordinate)
+        complaint.about_vertex(v, std::string("coordinate ") + "xyz"[axis] + " is " + to_text(x) + ", beyond " +
+                                      to_text(largest_coordinate));
+    }
+}
+
+void check_indices(const TetMesh& mesh, const Complaint& complaint) {
+  const auto vertices = mesh.vertices.cols();
+  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) {
+    const Tetrahedron& t = mesh.tetrahedra[i];
+    for (int v : t)
+      if (v < 0 || v >= vertices)
+        complaint.about_tetrahedron(
+            i, "vertex index " + std::to_string(v) + " is outside 0 to " + std::to_string(vertices - 1));
+    for (int a = 0; a < 4; ++a)
+      for (int b = a + 1; b < 4; ++b)
+        if (t[a] == t[b]) complaint.about_tetrahedron(i, complaint.vertex_name(t[a]) + " is used twice");
+  }
+}
+
+void check_duplicates(const TetMesh& mesh, const Complaint& complaint) {
+  std::vector<Tetrahedron> sorted = mesh.tetrahedra;
+  for (Tetrahedron& t : sorted) std::sort(t.begin(), t.end());
+  std::vector<std::size_t> order(sorted.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t l, std::size_t r) { return sorted[l] < sorted[r]; });
+  for (std::size_t k = 1; k < order.size(); ++k)
+    if (sorted[order[k - 1]] == sorted[order[k]]) {
+      const int line = complaint.tetrahedron_line(order[k - 1]);
+      complaint.about_tetrahedron(order[k], "same four vertices as " + complaint.tetrahedron_name(order[k - 1]) +
+                                                (line > 0 ? " (line " + std::to_string(line) + ")" : ""));
+    }
+}
+
+void orient(TetMesh& mesh, const Complaint& complaint) {
+  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) {
+    Tetrahedron& t = mesh.tetrahedra[i];
+    Points<4> p;
+    for (int k = 0; k < 4; ++k) p.col(k) = mesh.vertices.col(t[k]);
+    Real longest = 0;
+    for (int a = 0; a < 4; ++a)
+      for (int b = a + 1; b < 4; ++b) longest = std::max(longest, (p.col(b) - p.col(a)).stableNorm());
+    // Scaled to unit size first: cubes of tiny lengths would underflow.
+    const Matrix3 sides = (p.rightCols<3>().colwise() - p.col(0).eval()) / (longest > 0 ? longest : 1);
+    const Real relative = sides.col(0).dot(sides.col(1).cross(sides.col(2)));
+    const Real six_volumes = relative * longest * longest * longest;
+    if (!(std::abs(relative) >= flat_tetrahedron) || std::abs(six_volumes) < 6 * std::numeric_limits<Real>::min())
+      complaint.about_tetrahedron(
+          i, "flat: volume " + to_text(six_volumes / 6) + " at a longest edge of " + to_text(longest));
+    if (relative < 0) {
+      std::swap(t[2], t[3]);
+      ++mesh.repairs.reoriented;
+    }
+  }
+}
+
+void drop_unused_vertices(TetMesh& mesh) {
+  std::vector<int> new_index(static_cast<std::size_t>(mesh.vertices.cols()), -1);
+  for (const Tetrahedron& t : mesh.tetrahedra)
+    for (int v : t) new_index[v] = 0;
+  int kept = 0;
+  for (std::size_t v = 0; v < new_index.size(); ++v)
+    if (new_index[v] == 0) {
+      mesh.vertices.col(kept) = mesh.vertices.col(static_cast<Eigen::Index>(v)).eval();
+      new_index[v] = kept++;
+    }
+  const int dropped = static_cast<int>(mesh.vertices.cols()) - kept;
+  if (dropped == 0) return;
+  mesh.vertices.conservativeResize(Eigen::NoChange, kept);
+  mesh.repairs.dropped_vertices += dropped;
+  for (Tetrahedron& t : mesh.tetrahedra)
+    for (int& v : t) v = new_index[v];
+}
+
+void repair(TetMesh& mesh, const Complaint& complaint) {
+  check_vertices(mesh, complaint);
+  if (mesh.tetrahedra.empty()) complaint.about_mesh("the mesh has no tetrahedra");
+  check_indices(mesh, complaint);
+  check_duplicates(mesh, complaint);
+  orient(mesh, complaint);
+  drop_unused_vertices(mesh);
+}
+
+}  // namespace
+
+void repair(TetMesh& mesh) { repair(mesh, Complaint(mesh, nullptr)); }
+
+void repair(TetMesh& mesh, const MeshOrigin& origin) { repair(mesh, Complaint(mesh, &origin)); }
+
+Real volume(const TetMesh& mesh) {
+  const std::vector<Real> volumes = signed_volumes(mesh.vertices, mesh.tetrahedra);
+  return std::accumulate(volumes.begin(), volumes.end(), Real{0});
+}
+
+}  // namespace penalty

@@ -1,0 +1,101 @@
+#include "files.h"
+#include "penalty/mesh/read_mesh.h"
+
+namespace penalty::testing {
+namespace {
+
+class ReadVtk : public MeshFiles {
+ protected:
+  TetMesh read(const std::string& contents) const { return read_mesh(write("a.vtk", contents)); }
+  std::string complaint(const std::string& contents) const {
+    return mesh_error([&] { read(contents); });
+  }
+};
+
+TEST_F(ReadVtk, TakesCountedCells) { expect_two_tetrahedra(read(vtk_ascii)); }
+
+TEST_F(ReadVtk, TakesOffsetsAndSkipsFieldsAndMetadata) { expect_two_tetrahedra(read(vtk_offsets)); }
+
+TEST_F(ReadVtk, TakesBigEndianFloats) { expect_two_tetrahedra(read(vtk_binary())); }
+
+TEST_F(ReadVtk, TakesBigEndianOffsetsAndDoubles) { expect_two_tetrahedra(read(vtk_binary_offsets())); }
+
+TEST_F(ReadVtk, TakesBinaryCountsThatLookLikeWhiteSpace) {
+  // The coordinates begin with the bytes of a line end and of blanks.
+  std::string text = vtk_binary();
+  const auto at = text.find("float\n") + 6;
+  text.replace(at, 4, "\x20\x0a\x20\x20");  // 1.2e-19
+  EXPECT_EQ(read(text).vertices(0, 0), Real{std::bit_cast<float>(0x200a2020u)});
+}
+
+TEST_F(ReadVtk, TakesWindowsLineEndsTabsAndCapitals) {
+  std::string text;
+  for (char c : replaced(vtk_ascii, "1 0 0", "+1\t0\t0")) text += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  expect_two_tetrahedra(read(text));
+  expect_two_tetrahedra(read(replaced(vtk_ascii, "DATASET UNSTRUCTURED_GRID", "dataset unstructured_grid")));
+}
+
+TEST_F(ReadVtk, TakesCornersOfSecondOrderTetrahedra) {
+  std::string text = replaced(vtk_ascii, "CELLS 3 14\n4 0 1 2 3\n", "CELLS 3 20\n10 0 1 2 3 4 4 4 4 4 4\n");
+  text = replaced(text, "10\n5", "24\n5");
+  expect_two_tetrahedra(read(text));
+}
+
+TEST_F(ReadVtk, ReportsRepairs) {
+  EXPECT_EQ(read(replaced(vtk_ascii, "4 0 2 1 4", "4 0 1 2 4")).repairs.reoriented, 1);
+  EXPECT_EQ(read(replaced(vtk_ascii, "10\n5\n10", "10\n5\n5")).repairs.dropped_vertices, 1);
+}
+
+TEST_F(ReadVtk, NamesFileLineElementAndValue) {
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1", "0 nan -1")), "a.vtk:10: vertex 4: coordinate y is nan");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1", "0 0 1e999")), "a.vtk:10: vertex 4: coordinate z is inf");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1", "0 0 x")), "a.vtk:10: vertex 4: coordinate z is 'x', not a number");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1", "0 0 1,5")),
+            "a.vtk:10: vertex 4: coordinate z is '1,5', not a number");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "4 0 2 1 4", "4 0 2 1 9")),
+            "a.vtk:14: tetrahedron 2: vertex index 9 is outside 0 to 4");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "4 0 2 1 4", "4 0 2 1 99999999999")),
+            "a.vtk:14: tetrahedron 2: vertex index 99999999999 is outside 0 to 4");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "4 0 2 1 4", "4 0 2 1 1.5")),
+            "a.vtk:14: cell 2: a corner is '1.5', not an integer");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "4 0 2 1 4", "4 0 2 1 1")),
+            "a.vtk:14: tetrahedron 2: vertex 1 is used twice");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1", "3 4 0")),
+            "a.vtk:14: tetrahedron 2: flat: volume 0 at a longest edge of 5");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "10\n5", "12\n5")),
+            "a.vtk:16: cell 0: type 12 (hexahedron) is not a tetrahedron");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "5\n10", "10\n10")), "a.vtk:17: cell 1: a tetrahedron with 3 corners, not 4");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "4 0 2 1 4", "4 3 2 1 0")),
+            "a.vtk:14: tetrahedron 2: same four vertices as tetrahedron 0 (line 12)");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "10\n5\n10\n", "9\n5\n9\n")), "a.vtk: the mesh has no tetrahedra");
+}
+
+TEST_F(ReadVtk, NamesBrokenStructure) {
+  EXPECT_EQ(complaint("<?xml version=\"1.0\"?>\n"),
+            "a.vtk:1: not a legacy VTK file: it does not begin with '# vtk DataFile Version'");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "ASCII", "EBCDIC")),
+            "a.vtk:3: found 'ebcdic' where ASCII or BINARY should stand");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "UNSTRUCTURED_GRID", "POLYDATA")),
+            "a.vtk:4: the data set is 'POLYDATA', not UNSTRUCTURED_GRID");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "5 double", "5 bit")),
+            "a.vtk:5: coordinates of type 'bit' are not read: float and double are");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "0 0 -1\n", "")),
+            "a.vtk:10: vertex 4: coordinate x is 'CELLS', not a number");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "CELLS 3 14", "CELLS 3 15")),
+            "a.vtk:14: the cells take 14 numbers, not the 15 announced");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "CELLS 3 14", "CELLS 3 12")),
+            "a.vtk:14: cell 2: the number of corners is 4, the list has room for 2");
+  EXPECT_EQ(complaint(replaced(vtk_ascii, "CELL_TYPES 3", "CELL_TYPES 2")),
+            "a.vtk:15: there are 2 cell types for 3 cells");
+  EXPECT_EQ(complaint(replaced(vtk_offsets, "0 4 7 11", "0 7 4 11")),
+            "a.vtk:18: cell 2: offset 4 is out of order or beyond the 11 corners");
+  EXPECT_EQ(complaint(vtk_ascii.substr(0, vtk_ascii.find("4 0 2 1"))),
+            "a.vtk:11: the size of the cell list is 14, more than the rest of the file can hold");
+  EXPECT_EQ(complaint(vtk_ascii.substr(0, vtk_ascii.find("\n10\n5") - 10)),
+            "a.vtk:15: found 'ce' where a section should begin; the section CELL_TYPES is missing");
+  EXPECT_EQ(complaint(vtk_ascii.substr(0, vtk_ascii.find("CELL_TYPES"))),
+            "a.vtk:15: the section CELL_TYPES is missing");
+}
+
+}  // namespace
+}  // namespace penalty::testing

@@ -1,0 +1,108 @@
+#include "penalty/mesh/tet_mesh.h"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "files.h"
+
+namespace penalty::testing {
+namespace {
+
+TEST(Repair, LeavesAGoodMeshAlone) {
+  TetMesh mesh = two_tetrahedra();
+  repair(mesh);
+  expect_two_tetrahedra(mesh);
+}
+
+TEST(Repair, TurnsLeftHandedTetrahedra) {
+  TetMesh mesh = two_tetrahedra();
+  std::swap(mesh.tetrahedra[1][0], mesh.tetrahedra[1][1]);
+  ASSERT_LT(signed_volumes(mesh.vertices, mesh.tetrahedra)[1], 0);
+  repair(mesh);
+  EXPECT_EQ(mesh.repairs.reoriented, 1);
+  for (Real v : signed_volumes(mesh.vertices, mesh.tetrahedra)) EXPECT_DOUBLE_EQ(v, 1.0 / 6);
+}
+
+TEST(Repair, DropsUnmentionedVerticesAndKeepsTheOrderOfTheRest) {
+  TetMesh mesh = two_tetrahedra();
+  const TetMesh expected = mesh;
+  mesh.vertices.resize(3, 7);
+  mesh.vertices << Vector3(9, 9, 9), expected.vertices.leftCols(2), Vector3(8, 8, 8), expected.vertices.rightCols(3);
+  mesh.tetrahedra = {{1, 2, 4, 5}, {1, 4, 2, 6}};
+  repair(mesh);
+  EXPECT_EQ(mesh.repairs.dropped_vertices, 2);
+  EXPECT_EQ(mesh.vertices, expected.vertices);
+  EXPECT_EQ(mesh.tetrahedra, expected.tetrahedra);
+}
+
+TEST(Repair, NamesWhatItRefuses) {
+  const auto complaint = [](auto spoil) {
+    TetMesh mesh = two_tetrahedra();
+    mesh.source = "made";
+    spoil(mesh);
+    return invalid_argument([&] { repair(mesh); });
+  };
+  EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra.clear(); }), "made: the mesh has no tetrahedra");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.vertices(1, 4) = std::nan(""); }), "made: vertex 4: coordinate y is nan");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.vertices(2, 0) = -std::numeric_limits<Real>::infinity(); }),
+            "made: vertex 0: coordinate z is -inf");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.vertices(0, 1) = 1e101; }),
+            "made: vertex 1: coordinate x is 1e+101, beyond 1e+100");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[1][2] = 5; }),
+            "made: tetrahedron 1: vertex index 5 is outside 0 to 4");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[0][3] = -1; }),
+            "made: tetrahedron 0: vertex index -1 is outside 0 to 4");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[0][3] = 2; }), "made: tetrahedron 0: vertex 2 is used twice");
+  EXPECT_EQ(complaint([](TetMesh& m) {
+              m.tetrahedra[1] = {3, 0, 1, 2};
+            }),
+            "made: tetrahedron 1: same four vertices as tetrahedron 0");
+  EXPECT_EQ(complaint([](TetMesh& m) { m.vertices.col(4) << 2, 2, 0; }),
+            "made: tetrahedron 1: flat: volume 0 at a longest edge of 2.8284271247461903");
+  EXPECT_EQ(invalid_argument([] {
+              TetMesh empty;
+              repair(empty);
+            }),
+            "mesh: the mesh has no tetrahedra");
+}
+
+TEST(Repair, FlatnessIsRelativeToSize) {
+  // 6 V / L^3 of a corner of height h at unit legs: h / 2^(3/2).
+  for (Real scale : {1e-90, 1e-6, 1.0, 1e6, 1e90})
+    for (Real height : {0.9e-6, 1.1e-6}) {
+      TetMesh mesh = two_tetrahedra();
+      mesh.vertices.row(2) *= height * std::pow(2, 1.5);
+      mesh.vertices *= scale;
+      const std::string complaint = invalid_argument([&] { repair(mesh); });
+      EXPECT_EQ(complaint.empty(), height > 1e-6) << scale << " " << height << " " << complaint;
+    }
+}
+
+TEST(Repair, RefusesVolumesThatUnderflow) {
+  TetMesh mesh = two_tetrahedra();
+  mesh.vertices *= 1e-110;
+  EXPECT_NE(invalid_argument([&] { repair(mesh); }), "");
+}
+
+TEST(Quality, OfTheRegularTetrahedronMatchesClosedForm) {
+  TetMesh mesh;
+  mesh.vertices.resize(3, 4);
+  mesh.vertices << 1, 1, -1, -1, 1, -1, 1, -1, 1, -1, -1, 1;
+  mesh.tetrahedra = {{0, 1, 2, 3}};
+  repair(mesh);
+  const MeshQuality q = quality(mesh);
+  EXPECT_NEAR(q.edge_ratio, 1, 1e-15);
+  EXPECT_NEAR(q.smallest_dihedral, std::acos(1.0 / 3), 1e-15);
+  EXPECT_NEAR(q.largest_dihedral, std::acos(1.0 / 3), 1e-15);
+}
+
+TEST(Quality, OfACubeCornerMatchesClosedForm) {
+  const MeshQuality q = quality(two_tetrahedra());
+  EXPECT_NEAR(q.edge_ratio, std::numbers::sqrt2, 1e-15);
+  EXPECT_NEAR(q.smallest_dihedral, std::acos(1 / std::sqrt(3.0)), 1e-15);
+  EXPECT_NEAR(q.largest_dihedral, std::numbers::pi / 2, 1e-15);
+}
+
+}  // namespace
+}  // namespace penalty::testing
