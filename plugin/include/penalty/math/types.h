@@ -37,4 +37,17 @@ inline Matrix3 cross_matrix(const Vector3& a) {
   return m;
 }
 
+namespace detail {
+
+/// Eigen allocates differently under other vector or sanitizer flags, and what one side allocates the other may free: a
+/// program whose flags disagree with the library's fails to link, with this name, instead of crashing.
+template <int alignment, bool aligned_malloc>
+struct EigenFlags {
+  static const char same_as_in_the_library;
+};
+using OwnEigenFlags = EigenFlags<EIGEN_MAX_ALIGN_BYTES, EIGEN_MALLOC_ALREADY_ALIGNED != 0>;
+[[gnu::used]] inline const char* const eigen_flags = &OwnEigenFlags::same_as_in_the_library;
+
+}  // namespace detail
+
 }  // namespace penalty

@@ -1,0 +1,31 @@
+// The plugin in Bullet's classic world.
+#pragma once
+#include <BulletSoftBody/btDefaultSoftBodySolver.h>
+
+#include "penalty/bullet/attached_bodies.h"
+
+namespace penalty {
+
+/// A solver for btSoftRigidDynamicsWorld, handed to its constructor:
+///
+///     penalty::PenaltySoftBodySolver solver;
+///     btSoftRigidDynamicsWorld world(&dispatcher, &broadphase, &constraint_solver, &configuration, &solver);
+///     ...
+///     world.addSoftBody(body);
+///     solver.attach(*body, std::move(field));
+///
+/// Attached bodies are stepped whole in `predictMotion`: contact with rigid bodies included, so Bullet's own contact for
+/// them is switched off. All other soft bodies behave as under Bullet's default solver. Gravity is that of the body's
+/// world info, not of the world. The solver outlives the world.
+class PenaltySoftBodySolver : public btDefaultSoftBodySolver, public AttachedBodies {
+ public:
+  PenaltySoftBodySolver();
+  ~PenaltySoftBodySolver() override;
+
+  void predictMotion(btScalar time_step) override;
+  void solveConstraints(btScalar time_step) override;
+  void processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) override;
+  void processCollision(btSoftBody* body, btSoftBody* other) override;
+};
+
+}  // namespace penalty

@@ -1,0 +1,30 @@
+// Bullet soft bodies from tetrahedral meshes.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "penalty/mesh/tet_mesh.h"
+
+class btSoftBody;
+struct btSoftBodyWorldInfo;
+
+namespace penalty {
+
+struct SoftBodyOptions {
+  Real mass = 1;                       // of the whole body [kg]
+  bool equal_masses = true;            // else each node carries its share of the volume; equal ones allow larger substeps
+  std::vector<int> pinned;             // nodes of zero inverse mass
+  Real margin = 0.02;                  // collision margin [m]
+  Real friction = 0.5;                 // Coulomb coefficient, multiplied with that of the other body
+  /// For Bullet's own solver of the deformable world: its collision flags, and links along the edges, without which Bullet's
+  /// trees are never finished. The plugin's solvers need neither.
+  bool stock_deformable = false;
+};
+
+/// A Bullet soft body whose node i is vertex i of the mesh and whose faces are the boundary of the mesh. It holds no
+/// tetrahedra of Bullet's, and links only on request: these cost time in every step, and the field replaces them. `mesh.vertices` give the
+/// start positions. Throws std::invalid_argument that names the option, index and value.
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const SoftBodyOptions& options = {});
+
+}  // namespace penalty

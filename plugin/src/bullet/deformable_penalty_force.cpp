@@ -1,0 +1,163 @@
+#include "penalty/bullet/deformable_penalty_force.h"
+
+#include <BulletSoftBody/btSoftBody.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "convert.h"
+
+namespace penalty {
+namespace {
+
+// Beyond Bullet's own ids: addForce merges forces of equal type.
+btDeformableLagrangianForceType next_force_type() {
+  static std::atomic<int> next{1000};
+  return static_cast<btDeformableLagrangianForceType>(next++);
+}
+
+}  // namespace
+
+struct DeformablePenaltyForce::Attached {
+  btSoftBody* body;
+  PotentialField field;
+  PackedVectors positions, in, out;  // scratch, one column a node
+
+  Attached(btSoftBody& soft_body, PotentialField potential_field)
+      : body(&soft_body), field(std::move(potential_field)) {
+    positions = in = out = PackedVectors::Zero(4, field.num_particles());
+  }
+
+  void read_positions() {
+    for (int i = 0; i < body->m_nodes.size(); ++i) positions.col(i).head<3>() = to_vector(body->m_nodes[i].m_q);
+  }
+  void read_velocities() {
+    for (int i = 0; i < body->m_nodes.size(); ++i) in.col(i).head<3>() = to_vector(body->m_nodes[i].m_v);
+  }
+  void read(const TVStack& vectors) {
+    for (int i = 0; i < body->m_nodes.size(); ++i) in.col(i).head<3>() = to_vector(vectors[body->m_nodes[i].index]);
+  }
+  void add_to(TVStack& vectors, Real scale) const {
+    for (int i = 0; i < body->m_nodes.size(); ++i)
+      vectors[body->m_nodes[i].index] += to_bullet(Vector3(scale * out.col(i).head<3>()));
+  }
+};
+
+DeformablePenaltyForce::DeformablePenaltyForce(Real damping_time) : type_(next_force_type()), damping_time_(damping_time) {
+  if (!(damping_time >= 0) || !std::isfinite(damping_time))
+    throw std::invalid_argument("force: damping_time is " + std::to_string(damping_time) +
+                                ", must be zero or positive [s]");
+}
+
+DeformablePenaltyForce::~DeformablePenaltyForce() = default;
+
+void DeformablePenaltyForce::attach(btSoftBody& body, PotentialField field) {
+  if (field.num_particles() != body.m_nodes.size())
+    throw std::invalid_argument("attach: the field has " + std::to_string(field.num_particles()) +
+                                " particles, the soft body " + std::to_string(body.m_nodes.size()) + " nodes");
+  for (const auto& attached : attached_)
+    if (attached->body == &body) {
+      attached->field.add(std::make_unique<PotentialField>(std::move(field)));
+      return;
+    }
+  attached_.push_back(std::make_unique<Attached>(body, std::move(field)));
+}
+
+void DeformablePenaltyForce::detach(const btSoftBody& body) {
+  std::erase_if(attached_, [&](const auto& attached) { return attached->body == &body; });
+}
+
+template <class Function>
+void DeformablePenaltyForce::for_each_active(const Function& function) {
+  for (const auto& attached : attached_) {
+    if (m_softBodies.findLinearSearch(attached->body) == m_softBodies.size() || !attached->body->isActive()) continue;
+    if (attached->body->m_nodes.size() != attached->field.num_particles())
+      throw std::logic_error("attached soft body has " + std::to_string(attached->body->m_nodes.size()) +
+                             " nodes, had " + std::to_string(attached->field.num_particles()) + " when it was attached");
+    attached->read_positions();
+    attached->out.setZero();
+    function(*attached);
+  }
+}
+
+void DeformablePenaltyForce::addScaledForces(btScalar scale, TVStack& force) {
+  addScaledDampingForce(scale, force);
+  addScaledExplicitForce(scale, force);
+}
+
+void DeformablePenaltyForce::addScaledExplicitForce(btScalar scale, TVStack& force) {
+  for_each_active([&](Attached& a) {
+    a.field.add_forces(a.positions, a.out);
+    a.add_to(force, scale);
+  });
+}
+
+void DeformablePenaltyForce::addScaledDampingForce(btScalar scale, TVStack& force) {
+  if (damping_time_ == 0) return;
+  for_each_active([&](Attached& a) {
+    a.read_velocities();
+    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    a.add_to(force, scale);
+  });
+}
+
+void DeformablePenaltyForce::addScaledElasticForceDifferential(btScalar scale, const TVStack& dx, TVStack& df) {
+  for_each_active([&](Attached& a) {
+    a.read(dx);
+    a.field.add_stiffness_product(a.positions, StiffnessModel::gauss_newton, a.in, -1, a.out);
+    a.add_to(df, scale);
+  });
+}
+
+void DeformablePenaltyForce::addScaledDampingForceDifferential(btScalar scale, const TVStack& dv, TVStack& df) {
+  if (damping_time_ == 0) return;
+  for_each_active([&](Attached& a) {
+    a.read(dv);
+    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    a.add_to(df, scale);
+  });
+}
+
+void DeformablePenaltyForce::buildDampingForceDifferentialDiagonal(btScalar scale, TVStack& diagonal) {
+  if (damping_time_ == 0) return;
+  for_each_active([&](Attached& a) {
+    a.field.add_stiffness_diagonal(a.positions, -damping_time_, a.out);
+    a.add_to(diagonal, scale);
+  });
+}
+
+void DeformablePenaltyForce::addScaledHessian(btScalar scale) {
+  for_each_active([&](Attached& a) {
+    a.field.add_stiffness_diagonal(a.positions, Real(scale) * Real(scale), a.out);
+    for (int i = 0; i < a.body->m_nodes.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis)
+        a.body->m_nodes[i].m_effectiveMass[axis][axis] += static_cast<btScalar>(a.out(axis, i));
+  });
+}
+
+double DeformablePenaltyForce::totalElasticEnergy(btScalar) {
+  double sum = 0;
+  for_each_active([&](Attached& a) { sum += a.field.energy(a.positions); });
+  return sum;
+}
+
+// What damping takes in one step, -dt F_d . v, at the present velocities.
+double DeformablePenaltyForce::totalDampingEnergy(btScalar time_step) {
+  double sum = 0;
+  if (damping_time_ == 0) return sum;
+  for_each_active([&](Attached& a) {
+    a.read_velocities();
+    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    sum -= Real(time_step) * a.out.cwiseProduct(a.in).sum();
+  });
+  return sum;
+}
+
+double DeformablePenaltyForce::totalEnergy(btScalar time_step) {
+  return totalElasticEnergy(time_step) + totalDampingEnergy(time_step);
+}
+
+}  // namespace penalty

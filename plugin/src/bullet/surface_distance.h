@@ -1,0 +1,23 @@
+// Where the surface of a collision shape is, seen from a point.
+#pragma once
+#include <vector>
+
+#include "penalty/math/types.h"
+
+class btCollisionShape;
+
+namespace penalty {
+
+/// The nearest point of a surface. `distance` is negative inside; `normal` points outwards.
+struct SurfacePoint {
+  Vector3 point, normal;
+  Real distance;
+};
+
+/// Appends the nearest surface points of `shape` to `point`, in the frame of the shape and within `reach` [m], one for
+/// each convex part. In closed form for planes, spheres, boxes and capsules; by GJK and EPA for other convex shapes; child by
+/// child for compounds; by the nearest triangle for concave meshes, whose triangles face the counter-clockwise side.
+void append_surface_points(const btCollisionShape& shape, const Vector3& point, Real reach,
+                           std::vector<SurfacePoint>& found);
+
+}  // namespace penalty

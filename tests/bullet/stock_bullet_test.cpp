@@ -1,0 +1,139 @@
+// What Bullet does without the plugin, and that the plugin leaves it alone for bodies that are not attached.
+#include "bullet/simulation.h"
+
+#include <BulletSoftBody/btDeformableGravityForce.h>
+#include <BulletSoftBody/btDeformableMassSpringForce.h>
+#include <BulletSoftBody/btSoftBodyHelpers.h>
+
+namespace penalty::testing {
+namespace {
+
+constexpr Real frame = 1.0 / 60;
+
+class Squashed : public WorldTest {
+ protected:
+  // A box of Bullet's own tetrahedra, of full volume stiffness, squashed to a fifth of its height.
+  btSoftBody& add_squashed_box(Simulation& simulation, const TetMesh& mesh) {
+    auto made = make_soft_body(simulation.info(), mesh);
+    for (const Tetrahedron& t : mesh.tetrahedra) made->appendTetra(t[0], t[1], t[2], t[3]);
+    made->m_materials[0]->m_kVST = 1;
+    btSoftBody& body = simulation.add(std::move(made));
+    simulation.step(frame);  // Bullet takes its rest volumes from the first step
+    for (int i = 0; i < body.m_nodes.size(); ++i) {
+      btSoftBody::Node& node = body.m_nodes[i];
+      node.m_x.setY(node.m_x.y() / 5);
+      node.m_q = node.m_x;
+    }
+    return body;
+  }
+
+  static Real height(const btSoftBody& body) {
+    Real low = 1e9, high = -1e9;
+    for (int i = 0; i < body.m_nodes.size(); ++i) {
+      low = std::min(low, Real(body.m_nodes[i].m_x.y()));
+      high = std::max(high, Real(body.m_nodes[i].m_x.y()));
+    }
+    return high - low;
+  }
+
+  const TetMesh mesh = make_box({1, 1, 1}, {2, 2, 2});
+};
+
+TEST_P(Squashed, ABodyOfBulletsTetrahedraStaysFlat) {
+  Simulation bullet(GetParam(), Solver::bullet);
+  const btSoftBody& body = add_squashed_box(bullet, mesh);
+  bullet.step(frame, 120);
+  EXPECT_NEAR(height(body), 0.2, 1e-6);
+}
+
+TEST_P(Squashed, TheSameBodyAttachedRecovers) {
+  btSoftBody& body = add_squashed_box(sim, mesh);
+  sim.penalty().attach(body, make_elastic_field(mesh.vertices, mesh.tetrahedra, 10.0), {.step = {.damping_time = 0.01}});
+  EXPECT_NEAR(height(body), 0.2, 1e-6);
+  sim.step(frame, 120);
+  EXPECT_NEAR(height(body), 1, 0.02);
+  EXPECT_LT(mean_volume_error(sim.penalty(), body), 0.01);
+}
+
+// The deformable world reads arrays that only its own loaders fill when a body holds tetrahedra.
+INSTANTIATE_TEST_SUITE_P(World, Squashed, classic_world(), param_name);
+
+class BesideOurs : public WorldTest {
+ protected:
+  // A cloth of links, two corners pinned, that swings against a box.
+  struct Cloth {
+    explicit Cloth(Simulation& simulation, bool deformable) : springs(20, 0.1, false), gravity(btVector3(0, -9.75, 0)) {
+      simulation.set_gravity({0, -9.75, 0});
+      simulation.add_box({0.3, 0.3, 0.3}, 0, {0, -0.4, 0.3});
+      std::unique_ptr<btSoftBody> made(btSoftBodyHelpers::CreatePatch(
+          simulation.info(), btVector3(-1, 0, -1), btVector3(1, 0, -1), btVector3(-1, 0, 1), btVector3(1, 0, 1), 9, 9, 3, true));
+      made->getCollisionShape()->setMargin(btScalar(0.05));
+      if (deformable) made->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
+      body = &simulation.add(std::move(made));
+      if (deformable) {
+        simulation.deformable_world().addForce(body, &springs);
+        simulation.deformable_world().addForce(body, &gravity);
+      }
+    }
+
+    btDeformableMassSpringForce springs;
+    btDeformableGravityForce gravity;
+    btSoftBody* body;
+  };
+};
+
+TEST_P(BesideOurs, ABodyOfBulletsMovesAsInAWorldWithoutThePlugin) {
+  const bool deformable = GetParam() == WorldKind::deformable;
+  Simulation bullet(GetParam(), Solver::bullet);
+  Cloth alone(bullet, deformable), mixed(sim, deformable);
+  btSoftBody& ours = sim.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
+  for (int step = 0; step < 60; ++step) {
+    bullet.step(1.0 / 64);
+    sim.step(1.0 / 64);
+    for (int i = 0; i < alone.body->m_nodes.size(); ++i)
+      ASSERT_EQ((alone.body->m_nodes[i].m_x - mixed.body->m_nodes[i].m_x).length(), 0) << "step " << step << ", node " << i;
+  }
+  EXPECT_LT(lowest(*mixed.body), -0.3) << "the cloth hangs";
+  EXPECT_NEAR(center_of_mass(sim.penalty().particles(ours)).y(), 5 - 9.75 * 60 * 60 / 64 / 64 / 2, 1e-5);
+  alone.body = mixed.body = nullptr;
+}
+
+TEST_P(BesideOurs, OursMovesAsWithoutTheOther) {
+  const bool deformable = GetParam() == WorldKind::deformable;
+  Simulation lonely(GetParam());
+  lonely.set_gravity({0, -9.75, 0});
+  Cloth other(sim, deformable);
+  btSoftBody& here = sim.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
+  btSoftBody& there = lonely.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
+  for (btSoftBody* body : {&here, &there}) body->m_nodes[1].m_v = btVector3(1, 2, 3);
+  sim.step(1.0 / 64, 60);
+  lonely.step(1.0 / 64, 60);
+  EXPECT_EQ(sim.penalty().particles(here).positions, lonely.penalty().particles(there).positions);
+}
+
+INSTANTIATE_TEST_SUITE_P(World, BesideOurs, both_worlds(), param_name);
+
+class ImplicitWorld : public WorldTest {};
+
+TEST_P(ImplicitWorld, IsTheSameForWorldsOfAttachedBodiesOnly) {
+  Simulation implicit(GetParam());
+  implicit.deformable_world().setImplicit(true);
+  std::vector<btSoftBody*> bodies;
+  for (Simulation* s : {&sim, &implicit}) {
+    s->set_gravity({0, -9.75, 0});
+    s->add_ground();
+    bodies.push_back(&s->add_jelly(make_ball(0.3, 2), {.shift = {0, 0.5, 0}, .attach = {.step = {.damping_time = 0.002}}}));
+    s->add_box({0.1, 0.1, 0.1}, 0.3, {0.05, 1.1, 0});
+  }
+  for (int step = 0; step < 90; ++step) {
+    sim.step(1.0 / 64);
+    implicit.step(1.0 / 64);
+    ASSERT_EQ(sim.penalty().particles(*bodies[0]).positions, implicit.penalty().particles(*bodies[1]).positions) << step;
+    ASSERT_EQ(sim.penalty().particles(*bodies[0]).velocities, implicit.penalty().particles(*bodies[1]).velocities) << step;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(World, ImplicitWorld, deformable_world(), param_name);
+
+}  // namespace
+}  // namespace penalty::testing
