@@ -83,17 +83,10 @@ TEST_P(NotFinite, SynchronizeSetsBackToo) {
   EXPECT_TRUE(sim.penalty().particles(*body).positions.allFinite());
 }
 
-TEST_P(NotFinite, AForceUndoesTheStep) {
-  const PackedVectors before = sim.penalty().particles(*body).positions;
+TEST_P(NotFinite, AForceIsDropped) {
   body->addForce(btVector3(nan, 0, 0), 4);
-  sim.step(frame);
-  EXPECT_FALSE(sim.penalty().report(*body).finite);
-  EXPECT_EQ(sim.penalty().report(*body).first_bad_particle, 4);
-  EXPECT_TRUE(nodes_are_finite());
-  EXPECT_TRUE(sim.penalty().particles(*body).positions.allFinite());
-  EXPECT_LT((sim.penalty().particles(*body).positions - before).norm(), 1);
-  sim.step(frame);
-  EXPECT_TRUE(sim.penalty().report(*body).finite);
+  body->addForce(btVector3(0, 1, 0), 5);
+  expect_recovery(4);
 }
 
 INSTANTIATE_TEST_SUITE_P(World, NotFinite, both_worlds(), param_name);

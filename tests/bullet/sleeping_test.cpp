@@ -63,14 +63,15 @@ TEST_P(Sleeping, ActivateWakesIt) {
 }
 
 TEST_P(Sleeping, ARigidBodyThatRestsOnItSleepsToo) {
-  btRigidBody& box = sim.add_box({0.4, 0.05, 0.4}, 1, {0, 0.75, 0});
-  box.setDamping(btScalar(0.1), btScalar(0.5));
-  box.setAngularFactor(0);  // balances
+  btSoftBody& table = sim.add_jelly(make_box({0.6, 0.3, 0.6}, {4, 2, 4}),
+                                    {.shift = {2, 0.025, 0}, .attach = {.step = {.damping_time = 0.02}}});
+  btRigidBody& box = sim.add_box({0.2, 0.1, 0.2}, 1, {2.3, 0.46, 0.3});
+  let_sleep(table);
   let_sleep(box);
-  const Real time = time_to_sleep({body, &box});
+  const Real time = time_to_sleep({&table, &box});
   RecordProperty("seconds", std::to_string(time));
   EXPECT_GT(time, 2) << "box " << box.getActivationState() << " at " << box.getLinearVelocity().length() << " m/s, soft body "
-                     << body->getActivationState();
+                     << table.getActivationState();
   const Real y = Real(box.getWorldTransform().getOrigin().y());
   sim.step(frame, 120);
   EXPECT_NEAR(Real(box.getWorldTransform().getOrigin().y()), y, 1e-3) << "and neither sinks while asleep";

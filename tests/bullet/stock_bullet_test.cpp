@@ -58,16 +58,17 @@ TEST_P(Squashed, TheSameBodyAttachedRecovers) {
 // The deformable world reads arrays that only its own loaders fill when a body holds tetrahedra.
 INSTANTIATE_TEST_SUITE_P(World, Squashed, classic_world(), param_name);
 
-class BesideOurs : public WorldTest {
+class BesideOurs : public ::testing::TestWithParam<WorldKind> {
  protected:
-  // A cloth of links, two corners pinned, that swings against a box.
+  // A cloth of links, two corners pinned, that swings against a box. Its forces outlive the world.
   struct Cloth {
-    explicit Cloth(Simulation& simulation, bool deformable) : springs(20, 0.1, false), gravity(btVector3(0, -9.75, 0)) {
+    void hang_in(Simulation& simulation, WorldKind kind) {
       simulation.set_gravity({0, -9.75, 0});
       simulation.add_box({0.3, 0.3, 0.3}, 0, {0, -0.4, 0.3});
       std::unique_ptr<btSoftBody> made(btSoftBodyHelpers::CreatePatch(
           simulation.info(), btVector3(-1, 0, -1), btVector3(1, 0, -1), btVector3(-1, 0, 1), btVector3(1, 0, 1), 9, 9, 3, true));
       made->getCollisionShape()->setMargin(btScalar(0.05));
+      const bool deformable = kind == WorldKind::deformable;
       if (deformable) made->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
       body = &simulation.add(std::move(made));
       if (deformable) {
@@ -76,39 +77,39 @@ class BesideOurs : public WorldTest {
       }
     }
 
-    btDeformableMassSpringForce springs;
-    btDeformableGravityForce gravity;
-    btSoftBody* body;
+    btDeformableMassSpringForce springs{20, btScalar(0.1), false};
+    btDeformableGravityForce gravity{btVector3(0, btScalar(-9.75), 0)};
+    btSoftBody* body = nullptr;
   };
 };
 
 TEST_P(BesideOurs, ABodyOfBulletsMovesAsInAWorldWithoutThePlugin) {
-  const bool deformable = GetParam() == WorldKind::deformable;
-  Simulation bullet(GetParam(), Solver::bullet);
-  Cloth alone(bullet, deformable), mixed(sim, deformable);
-  btSoftBody& ours = sim.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
+  Cloth alone, mixed;
+  Simulation bullet(GetParam(), Solver::bullet), both(GetParam());
+  alone.hang_in(bullet, GetParam());
+  mixed.hang_in(both, GetParam());
+  btSoftBody& ours = both.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
   for (int step = 0; step < 60; ++step) {
     bullet.step(1.0 / 64);
-    sim.step(1.0 / 64);
+    both.step(1.0 / 64);
     for (int i = 0; i < alone.body->m_nodes.size(); ++i)
       ASSERT_EQ((alone.body->m_nodes[i].m_x - mixed.body->m_nodes[i].m_x).length(), 0) << "step " << step << ", node " << i;
   }
   EXPECT_LT(lowest(*mixed.body), -0.3) << "the cloth hangs";
-  EXPECT_NEAR(center_of_mass(sim.penalty().particles(ours)).y(), 5 - 9.75 * 60 * 60 / 64 / 64 / 2, 1e-5);
-  alone.body = mixed.body = nullptr;
+  EXPECT_NEAR(center_of_mass(both.penalty().particles(ours)).y(), 5 - 9.75 * 60 * 60 / 64 / 64 / 2, 1e-5);
 }
 
 TEST_P(BesideOurs, OursMovesAsWithoutTheOther) {
-  const bool deformable = GetParam() == WorldKind::deformable;
-  Simulation lonely(GetParam());
+  Cloth other;
+  Simulation both(GetParam()), lonely(GetParam());
   lonely.set_gravity({0, -9.75, 0});
-  Cloth other(sim, deformable);
-  btSoftBody& here = sim.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
+  other.hang_in(both, GetParam());
+  btSoftBody& here = both.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
   btSoftBody& there = lonely.add_jelly(make_ball(0.3, 2), {.shift = {20, 5, 0}});
   for (btSoftBody* body : {&here, &there}) body->m_nodes[1].m_v = btVector3(1, 2, 3);
-  sim.step(1.0 / 64, 60);
+  both.step(1.0 / 64, 60);
   lonely.step(1.0 / 64, 60);
-  EXPECT_EQ(sim.penalty().particles(here).positions, lonely.penalty().particles(there).positions);
+  EXPECT_EQ(both.penalty().particles(here).positions, lonely.penalty().particles(there).positions);
 }
 
 INSTANTIATE_TEST_SUITE_P(World, BesideOurs, both_worlds(), param_name);

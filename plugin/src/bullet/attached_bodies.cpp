@@ -87,7 +87,14 @@ void AttachedBody::read_nodes() {
 void AttachedBody::read_forces() {
   const int size = stepped.particles.size();
   bool any = false;
-  for (int i = 0; i < size && !any; ++i) any = !body->m_nodes[i].m_f.isZero();
+  for (int i = 0; i < size; ++i) {
+    btVector3& force = body->m_nodes[i].m_f;
+    if (!std::isfinite(force.x()) || !std::isfinite(force.y()) || !std::isfinite(force.z())) {
+      rejected_particle = i;
+      force.setZero();
+    }
+    any = any || !force.isZero();
+  }
   if (!any && stepped.external_forces.size() == 0) return;
   stepped.positions_changed();
   if (!any) {

@@ -300,8 +300,10 @@ std::span<AttachedBody* const> AttachedBodies::World::step(std::span<btSoftBody*
     Island island;
     island.bodies.push_back(&stepped);
     detect_contacts(*attached, island, duration, gravity_applied);
+    // Sleeps only after what it carries, which in turn waits, as one island of Bullet's, for the soft body.
     for (const TouchedRigidBody& touched : island.touched)
-      if (touched.start.is_dynamic()) body->setDeactivationTime(0);  // sleeps only after what it carries
+      if (touched.start.is_dynamic() && touched.body->getActivationState() != WANTS_DEACTIVATION)
+        body->setDeactivationTime(0);
     islands_.push_back(std::move(island));
     stepped_.push_back(attached);
   }
