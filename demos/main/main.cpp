@@ -1,0 +1,129 @@
+// penalty-demo: runs a scene in a Bullet world, measures it, draws it.
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+
+#include "main/command_line.h"
+#include "main/outputs.h"
+#include "main/pictures.h"
+#include "main/progress.h"
+#include "main/recording.h"
+#include "main/summary.h"
+
+namespace {
+
+using namespace penalty;
+using namespace penalty::demo;
+
+enum Status { done = 0, failed = 1, misused = 2, not_finite = 3 };
+
+/// Files are opened before the run: who mistyped a path is told at once, not after an hour.
+std::optional<std::ofstream> open_summary(const RunOptions& options) {
+  if (!options.summary || *options.summary == "-") return {};
+  std::ofstream file(*options.summary);
+  if (!file) throw UsageError("--summary " + *options.summary + ": cannot be written");
+  return file;
+}
+
+void make_directory(const std::filesystem::path& directory) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (!std::filesystem::is_directory(directory)) throw UsageError("--out " + directory.string() + ": cannot be made a directory");
+  if (!std::ofstream(directory / "summary.json")) throw UsageError("--out " + directory.string() + ": cannot be written to");
+}
+
+BodyMesh load(const SceneEntry& entry, const SceneOptions& options) try {
+  return entry.body(options);
+} catch (const MeshError& error) {
+  throw UsageError(one_line(error.what()));
+} catch (const std::invalid_argument& error) {
+  throw UsageError(one_line(error.what()));
+}
+
+std::unique_ptr<Scene> enter_world(const SceneEntry& entry, const RunOptions& options, const BodyMesh& body) try {
+  return std::make_unique<Scene>(entry.setup(options.scene_options, body), options.world);
+} catch (const std::invalid_argument& error) {
+  throw UsageError(one_line(error.what()));
+}
+
+bool worse(const Recording& a, const Recording& b) {
+  if (a.finite != b.finite) return !a.finite;
+  return a.rest_error > b.rest_error;
+}
+
+Status run(RunOptions options) {
+  const SceneEntry& entry = find_scene(options.scene);
+  const Real duration = options.duration.value_or(entry.duration);
+  const long steps = num_steps(duration, options.rate);
+  const bool draws = options.render && options.out.has_value();
+  const FramePlan frames = draws ? plan_frames(duration, options.rate) : FramePlan{};
+  const BodyMesh body = load(entry, options.scene_options);
+  std::optional<std::ofstream> summary_file = open_summary(options);
+  if (options.out) make_directory(*options.out);
+
+  // Of several runs the worst is described and drawn.
+  std::optional<Recording> worst;
+  const int runs = std::max(options.seeds, 1);
+  int recovered = 0;
+  nlohmann::ordered_json each_seed = nlohmann::ordered_json::array();
+  {
+    Progress progress(options.scene, steps * runs);
+    for (int r = 0; r < runs; ++r) {
+      const std::unique_ptr<Scene> scene = enter_world(entry, options, body);
+      Recording recording =
+          record(*scene, options, steps, frames, [&](long step) { progress.advance_to(r * steps + step); });
+      recovered += recording.recovered();
+      each_seed.push_back({{"seed", recording.seed}, {"rest_error", recording.rest_error}, {"recovered", recording.recovered()}});
+      if (!worst || worse(recording, *worst)) worst = std::move(recording);
+      ++options.scene_options.seed;
+    }
+  }
+
+  nlohmann::ordered_json summary = summarize(*worst, options, body);
+  if (options.seeds > 0) {
+    summary["runs"] = runs;
+    summary["recovered_runs"] = recovered;
+    summary["each_seed"] = each_seed;
+  }
+  const std::string text = summary.dump(2) + "\n";
+  if (summary_file) *summary_file << text << std::flush;
+  if (options.summary == "-") std::cout << text << std::flush;
+  if (!options.summary) std::cout << describe(summary) << std::flush;
+  if (options.out) {
+    if (!(std::ofstream(*options.out / "summary.json") << text << std::flush))
+      throw std::runtime_error((*options.out / "summary.json").string() + ": cannot be written");
+    write_csv(*options.out / "energies.csv", worst->steps);
+    write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, worst->steps);
+  }
+  if (summary_file && !*summary_file) throw std::runtime_error(*options.summary + ": cannot be written");
+
+  if (draws) {
+    Progress progress("drawing", static_cast<long>(worst->frames.size()) + 1);
+    options.scene_options.seed = worst->seed;
+    const std::string remarks = draw(*worst, options, entry.setup(options.scene_options, body), frames, *options.out,
+                                     [&](long drawn) { progress.advance_to(drawn); });
+    if (!remarks.empty()) std::cerr << "penalty-demo: " << remarks << '\n';
+  }
+  if (!worst->finite) {
+    std::cerr << "penalty-demo: " << worst->failure << '\n';
+    return not_finite;
+  }
+  return done;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  CommandLine command_line = parse(argc, argv);
+  std::cout << command_line.text << std::flush;
+  return command_line.run ? run(std::move(*command_line.run)) : done;
+} catch (const UsageError& error) {
+  std::cerr << "penalty-demo: " << error.what() << '\n';
+  return misused;
+} catch (const std::bad_alloc&) {
+  std::cerr << "penalty-demo: not enough memory\n";
+  return failed;
+} catch (const std::exception& error) {
+  std::cerr << "penalty-demo: " << one_line(error.what()) << '\n';
+  return failed;
+}

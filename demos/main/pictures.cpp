@@ -1,0 +1,169 @@
+#include "main/pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "render/renderer.h"
+#include "render/video.h"
+
+namespace penalty::demo {
+namespace {
+
+using render::Frame;
+using render::Overlay;
+
+/// Turns recorded frames into what the renderer draws; everything but the camera is fixed for the clip.
+class Stage {
+ public:
+  Stage(const Recording& recording, const RunOptions& options, const SceneSetup& setup)
+      : recording_(recording), options_(options), setup_(setup), triangles_(setup.body.drawn_triangles()) {
+    colors_.square_root = options.coloring == Coloring::energy;
+    colors_.high = color_range();
+  }
+
+  Frame frame(const FrameRecord& record) const {
+    Frame frame;
+    frame.colors = colors_;
+    if (setup_.ground) frame.ground = 0.0;
+    render::SoftSurface surface;
+    surface.vertices = setup_.body.drawn(record.positions);
+    surface.triangles = triangles_;
+    surface.values = drawn_values(record.values);
+    surface.wire = !setup_.body.surface;
+    frame.surfaces.push_back(std::move(surface));
+    for (std::size_t b = 0; b < record.balls.size(); ++b) {
+      render::Transform transform;
+      transform << record.balls[b].rotation, record.balls[b].position;
+      frame.bodies.push_back({.shape = render::Sphere{setup_.balls[b].radius},
+                              .transform = transform,
+                              .color = render::palette(static_cast<int>(b)),
+                              .two_tone = true});
+    }
+    for (int i : setup_.pinned) frame.markers.push_back({.position = record.positions.col(i)});
+    return frame;
+  }
+
+  Overlay overlay(const FrameRecord& record) const {
+    Overlay overlay;
+    overlay.title = title();
+    char time[32];
+    std::snprintf(time, sizeof time, "t = %.2f s", record.time);
+    overlay.subtitle = {time, std::to_string(setup_.body.mesh.tetrahedra.size()) + " tetrahedra",
+                        std::string(name_of(options_.world)) + " world, " + std::string(bullet_precision())};
+    overlay.color_bar = options_.coloring == Coloring::energy
+                            ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() + "/m³]", unit()}
+                            : render::ColorBar{"mean |C|\nof lengths", 1};
+    overlay.inset = curves(record.time);
+    return overlay;
+  }
+
+  std::string title() const {
+    if (setup_.name == "beam") return "Clamped beam";
+    if (setup_.name == "flight") return "Free flight";
+    return "Drop among rigid balls";
+  }
+
+ private:
+  Eigen::VectorXd drawn_values(const Eigen::VectorXd& values) const {
+    if (!setup_.body.surface) return values;
+    const EmbeddedSurface& embedded = *setup_.body.surface;
+    Eigen::VectorXd drawn = Eigen::VectorXd::Zero(embedded.weights.cols());
+    for (Eigen::Index v = 0; v < drawn.size(); ++v)
+      for (int k = 0; k < 4; ++k) drawn[v] += embedded.weights(k, v) * values[embedded.stencils[v][k]];
+    return drawn.cwiseMax(0);
+  }
+
+  /// The highest value that most of the body reaches at some time: single vertices would leave the rest in the dark.
+  double color_range() const {
+    double high = 0;
+    for (const FrameRecord& frame : recording_.frames) {
+      std::vector<double> values(frame.values.begin(), frame.values.end());
+      const auto rank = values.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(values.size() - 1));
+      std::nth_element(values.begin(), rank, values.end());
+      if (std::isfinite(*rank)) high = std::max(high, *rank);
+    }
+    return high > 0 ? high : 1;
+  }
+
+  double unit() const { return colors_.high >= 1e6 ? 1e6 : colors_.high >= 1e3 ? 1e3 : 1; }
+  std::string unit_name() const { return colors_.high >= 1e6 ? "MJ" : colors_.high >= 1e3 ? "kJ" : "J"; }
+
+  render::Inset curves(Real until) const {
+    double high = 0;
+    for (const StepRecord& step : recording_.steps) high = std::max({high, step.energies.elastic, step.energies.kinetic});
+    const double scale = high >= 1e4 ? 1e3 : 1;
+    render::Inset inset{.title = scale > 1 ? "energy [kJ]" : "energy [J]", .series = {}};
+    render::Series elastic{.name = "elastic", .color = render::palette(1), .x = {}, .y = {}};
+    render::Series kinetic{.name = "kinetic", .color = render::palette(0), .x = {}, .y = {}};
+    for (const StepRecord& step : recording_.steps) {
+      if (step.time > until + 1e-9) break;
+      elastic.x.push_back(step.time);
+      elastic.y.push_back(step.energies.elastic / scale);
+      kinetic.x.push_back(step.time);
+      kinetic.y.push_back(step.energies.kinetic / scale);
+    }
+    inset.series = {elastic, kinetic};
+    inset.x_high = std::max(recording_.steps.back().time, 1e-9);
+    inset.y_high = high > 0 ? 1.05 * high / scale : 1;
+    return inset;
+  }
+
+  const Recording& recording_;
+  const RunOptions& options_;
+  const SceneSetup& setup_;
+  std::vector<Triangle> triangles_;
+  render::ColorScale colors_;
+};
+
+render::Metadata metadata(const RunOptions& options, const Recording& recording, const Stage& stage) {
+  char parameters[160];
+  std::snprintf(parameters, sizeof parameters, "scene %s, world %s, rate %g Hz, seed %u", options.scene.c_str(),
+                std::string(name_of(options.world)).c_str(), options.rate, recording.seed);
+  return {{"Title", stage.title()}, {"Description", parameters}, {"Software", "penalty-demo"}};
+}
+
+}  // namespace
+
+std::string draw(const Recording& recording, const RunOptions& options, const SceneSetup& setup, const FramePlan& plan,
+                 const std::filesystem::path& directory, const std::function<void(long)>& progress) {
+  const Stage stage(recording, options, setup);
+  const render::View view{.azimuth = setup.look.azimuth, .elevation = setup.look.elevation, .left = -0.62};  // beside the curves
+  std::string remarks;
+
+  const Real wanted = options.still.value_or(setup.look.still_time);
+  const auto later = [wanted](const FrameRecord& a, const FrameRecord& b) {
+    return std::abs(a.time - wanted) < std::abs(b.time - wanted);
+  };
+  const FrameRecord& moment =
+      wanted < 0 ? recording.frames.back() : *std::min_element(recording.frames.begin(), recording.frames.end(), later);
+  {
+    render::Renderer renderer({.backend = options.backend, .quality = options.quality});
+    Frame frame = stage.frame(moment);
+    frame.camera = frame_camera(bounds_of(frame), renderer.aspect(), view);
+    write_png(directory / (setup.name + ".png"), renderer.render(frame, stage.overlay(moment)),
+              metadata(options, recording, stage));
+    progress(1);
+  }
+
+  const bool finest = options.quality == render::Quality::still;
+  render::Renderer renderer({.backend = options.backend, .quality = finest ? render::Quality::video : options.quality});
+  render::Bounds bounds;
+  for (const FrameRecord& record : recording.frames) bounds.add(bounds_of(stage.frame(record)));
+  const render::Camera camera = frame_camera(bounds, renderer.aspect(), view);
+  render::VideoWriter video(directory / (setup.name + ".mp4"), renderer.width(), renderer.height(),
+                            {.frames_per_second = plan.frames_per_second});
+  long done = 1;
+  for (const FrameRecord& record : recording.frames) {
+    Frame frame = stage.frame(record);
+    frame.camera = camera;
+    video.add(renderer.render(frame, stage.overlay(record)));
+    progress(++done);
+  }
+  video.finish();
+  if (!video.encoded())
+    remarks = "no ffmpeg: the frames are in " + video.frames_directory().string() + "; encode them with " + video.command();
+  return remarks;
+}
+
+}  // namespace penalty::demo

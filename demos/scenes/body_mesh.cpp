@@ -1,0 +1,105 @@
+#include "scenes/body_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "penalty/mesh/builders.h"
+#include "penalty/mesh/read_mesh.h"
+#include "penalty/mesh/read_surface.h"
+
+namespace penalty::demo {
+namespace {
+
+constexpr Real size = 2;               // of a scaled mesh, along its longest side [m]
+constexpr int lattice_cells = 20;      // of an embedded surface, unless the user says otherwise
+constexpr Real samples_per_cell = 1.6; // contact points along the side of a lattice cell
+
+/// Moves the bounding box to the origin and, if `scale`, gives its longest side the standard length.
+void place(Eigen::Matrix3Xd& vertices, bool scale) {
+  const Vector3 low = vertices.rowwise().minCoeff(), high = vertices.rowwise().maxCoeff();
+  const Real factor = scale ? size / (high - low).maxCoeff() : 1;
+  vertices = (vertices.colwise() - (low + high) / 2) * factor;
+}
+
+int cells_in(const SceneOptions& options, int by_default, int most) {
+  const int cells = options.cells.value_or(by_default);
+  if (cells < 2 || cells > most)
+    throw std::invalid_argument("--cells is " + std::to_string(cells) + ", must be 2 to " + std::to_string(most) +
+                                " for this mesh");
+  return cells;
+}
+
+BodyMesh built(TetMesh mesh, bool scale) {
+  place(mesh.vertices, scale);
+  return {std::move(mesh), {}};
+}
+
+BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options) {
+  const int cells = cells_in(options, lattice_cells, 200);
+  TriangleSurface surface = read_surface(path);
+  place(surface.vertices, options.scale);
+  try {
+    EmbeddedSurface lattice = embed(surface, {.cells = cells});
+    return {lattice.lattice, std::move(lattice)};
+  } catch (const std::invalid_argument& error) {
+    throw MeshError(error.what());
+  }
+}
+
+}  // namespace
+
+Eigen::Matrix3Xd BodyMesh::drawn(const Eigen::Matrix3Xd& positions) const {
+  return surface ? skin(*surface, positions) : positions;
+}
+
+std::vector<Triangle> BodyMesh::drawn_triangles() const {
+  return surface ? surface->surface.triangles : boundary_faces(mesh.tetrahedra);
+}
+
+std::vector<ContactPoint> BodyMesh::contact_points() const {
+  std::vector<ContactPoint> points;
+  if (!surface) return points;
+  // The lattice knows its cell only through its shape: the longest edge of a tetrahedron is one cell long.
+  const Tetrahedron& t = mesh.tetrahedra.front();
+  Real cell = 0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < i; ++j) cell = std::max(cell, (mesh.vertices.col(t[i]) - mesh.vertices.col(t[j])).norm());
+  for (int vertex : contact_samples(*surface, cell / samples_per_cell)) {
+    ContactPoint point;
+    point.particles = surface->stencils[vertex];
+    for (int k = 0; k < 4; ++k) point.weights[k] = surface->weights(k, vertex);
+    point.num_particles = 4;
+    points.push_back(point);
+  }
+  return points;
+}
+
+std::filesystem::path bunny_path() { return "/usr/share/glmark2/models/bunny.obj"; }
+
+BodyMesh load_body(const SceneOptions& options, const std::string& by_default) {
+  const std::string& name = options.mesh.empty() ? by_default : options.mesh;
+  if (name == "torus") {
+    const int cells = cells_in(options, 20, 400);
+    return built(make_torus(0.7, 0.3, std::max(1, cells * 3 / 20), std::max(3, cells * 27 / 20)), options.scale);
+  }
+  if (name == "ball") return built(make_ball(1, cells_in(options, 12, 100) / 2), options.scale);
+  if (name == "box") {
+    const int cells = cells_in(options, 10, 100);
+    return built(make_box({2, 2, 2}, {cells, cells, cells}), options.scale);
+  }
+  if (name == "bunny") {
+    if (!std::filesystem::exists(bunny_path()))
+      throw MeshError(bunny_path().string() + ": no such file; install the package glmark2-data, or give --mesh");
+    return embedded(bunny_path(), options);
+  }
+  if (is_surface_file(name)) return embedded(name, options);
+  if (!is_tetrahedral_mesh_file(name) && !std::filesystem::exists(name))
+    throw MeshError(name + ": no such file, and none of bunny, torus, ball, box");
+  BodyMesh body{read_mesh(name), {}};
+  if (options.cells) throw std::invalid_argument("--cells does not apply to a mesh that has its tetrahedra");
+  place(body.mesh.vertices, options.scale);
+  return body;
+}
+
+}  // namespace penalty::demo

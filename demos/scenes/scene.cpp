@@ -1,0 +1,236 @@
+#include "scenes/scene.h"
+
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
+#include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
+#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
+#include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
+#include <btBulletDynamicsCommon.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "penalty/bullet/penalty_deformable_body_solver.h"
+#include "penalty/bullet/penalty_soft_body_solver.h"
+#include "penalty/bullet/soft_body.h"
+
+namespace penalty::demo {
+namespace {
+
+btVector3 to_bullet(const Vector3& v) {
+  return {static_cast<btScalar>(v.x()), static_cast<btScalar>(v.y()), static_cast<btScalar>(v.z())};
+}
+
+Vector3 from_bullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+
+Matrix3 from_bullet(const btMatrix3x3& m) {
+  Matrix3 result;
+  for (int row = 0; row < 3; ++row) result.row(row) = from_bullet(m[row]).transpose();
+  return result;
+}
+
+/// Either world of Bullet with the plugin's solver in it. Members are destroyed from the last to the first: the world goes
+/// before the solvers it points to.
+class World {
+ public:
+  explicit World(WorldKind kind) : dispatcher_(&configuration_) {
+    if (kind == WorldKind::classic) {
+      auto solver = std::make_unique<PenaltySoftBodySolver>();
+      auto world = std::make_unique<btSoftRigidDynamicsWorld>(&dispatcher_, &broadphase_, &classic_constraints_,
+                                                              &configuration_, solver.get());
+      world_info_ = &world->getWorldInfo();
+      classic_ = world.get();
+      attached_ = solver.get();
+      classic_solver_ = std::move(solver);
+      world_ = std::move(world);
+    } else {
+      auto solver = std::make_unique<PenaltyDeformableBodySolver>();
+      deformable_constraints_.setDeformableSolver(solver.get());
+      auto world = std::make_unique<btDeformableMultiBodyDynamicsWorld>(
+          &dispatcher_, &broadphase_, &deformable_constraints_, &configuration_, solver.get());
+      world_info_ = &world->getWorldInfo();
+      deformable_ = world.get();
+      attached_ = solver.get();
+      deformable_solver_ = std::move(solver);
+      world_ = std::move(world);
+    }
+  }
+
+  void add(btSoftBody* body) { classic_ ? classic_->addSoftBody(body) : deformable_->addSoftBody(body); }
+  void remove(btSoftBody* body) { classic_ ? classic_->removeSoftBody(body) : deformable_->removeSoftBody(body); }
+
+  btDiscreteDynamicsWorld& world() { return *world_; }
+  btSoftBodyWorldInfo& info() { return *world_info_; }
+  AttachedBodies& attached() { return *attached_; }
+
+ private:
+  btSoftBodyRigidBodyCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_;
+  btDbvtBroadphase broadphase_;
+  btSequentialImpulseConstraintSolver classic_constraints_;
+  btDeformableMultiBodyConstraintSolver deformable_constraints_;
+  std::unique_ptr<PenaltySoftBodySolver> classic_solver_;
+  std::unique_ptr<PenaltyDeformableBodySolver> deformable_solver_;
+  std::unique_ptr<btDiscreteDynamicsWorld> world_;
+  btSoftRigidDynamicsWorld* classic_ = nullptr;
+  btDeformableMultiBodyDynamicsWorld* deformable_ = nullptr;
+  AttachedBodies* attached_ = nullptr;
+  btSoftBodyWorldInfo* world_info_ = nullptr;
+};
+
+constexpr Real ground_half_width = 50, ground_half_height = 1;  // [m]
+
+}  // namespace
+
+std::string_view bullet_precision() { return sizeof(btScalar) == sizeof(float) ? "float32" : "float64"; }
+
+struct Scene::Impl {
+  SceneSetup setup;
+  World world;
+  std::vector<std::unique_ptr<btCollisionShape>> shapes;
+  std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the balls, then the ground
+  std::unique_ptr<btSoftBody> body;
+  std::vector<ContactPoint> contact_points;
+  Real tip_start = 0;
+
+  Impl(SceneSetup given, WorldKind kind) : setup(std::move(given)), world(kind) {
+    btSoftBodyWorldInfo& info = world.info();
+    info.air_density = 0;
+    info.water_density = 0;
+    info.m_maxDisplacement = 1e6;
+    info.m_gravity = to_bullet(setup.gravity);
+    info.m_sparsesdf.Initialize();
+    info.m_sparsesdf.setDefaultVoxelsz(static_cast<btScalar>(voxel_size()));
+    world.world().setGravity(to_bullet(setup.gravity));
+
+    for (const Ball& ball : setup.balls)
+      add_rigid(std::make_unique<btSphereShape>(static_cast<btScalar>(ball.radius)), ball.mass, ball.position);
+    if (setup.ground)
+      add_rigid(std::make_unique<btBoxShape>(to_bullet({ground_half_width, ground_half_height, ground_half_width})), 0,
+                {0, -ground_half_height, 0});
+    add_soft();
+  }
+
+  ~Impl() {
+    world.attached().detach(*body);
+    world.remove(body.get());
+    for (const auto& rigid : rigid_bodies) world.world().removeRigidBody(rigid.get());
+  }
+
+  /// Bullet samples rigid shapes on a grid: a tenth of the smallest is fine enough for its corners.
+  Real voxel_size() const {
+    Real smallest = 2 * ground_half_height;
+    for (const Ball& ball : setup.balls) smallest = std::min(smallest, 2 * ball.radius);
+    return smallest / 10;
+  }
+
+  void add_rigid(std::unique_ptr<btConvexInternalShape> shape, Real mass, const Vector3& position) {
+    btVector3 inertia(0, 0, 0);
+    if (mass > 0) shape->calculateLocalInertia(static_cast<btScalar>(mass), inertia);
+    btRigidBody::btRigidBodyConstructionInfo info(static_cast<btScalar>(mass), nullptr, shape.get(), inertia);
+    info.m_startWorldTransform.setOrigin(to_bullet(position));
+    info.m_friction = 0.7f;
+    info.m_rollingFriction = 0.05f;
+    auto body_of_shape = std::make_unique<btRigidBody>(info);
+    world.world().addRigidBody(body_of_shape.get());
+    rigid_bodies.push_back(std::move(body_of_shape));
+    shapes.push_back(std::move(shape));
+  }
+
+  void add_soft() {
+    SoftBodyOptions options;
+    options.mass = setup.mass;
+    options.pinned = setup.pinned;
+    options.friction = 0.7;
+    TetMesh started = setup.body.mesh;
+    started.vertices = setup.positions;
+    body = make_soft_body(world.info(), started, options);
+    for (int i = 0; i < body->m_nodes.size(); ++i) body->m_nodes[i].m_v = to_bullet(setup.velocities.col(i));
+    body->setActivationState(DISABLE_DEACTIVATION);  // what is measured does not fall asleep
+    world.add(body.get());
+    AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
+    contact_points = attach.contact_points;
+    if (contact_points.empty())
+      for (int i = 0; i < body->m_nodes.size(); ++i) contact_points.push_back(ContactPoint::at_particle(i));
+    world.attached().attach(*body, std::move(setup.field), attach);
+    tip_start = mean_tip_height(pack(setup.positions));
+  }
+
+  const Particles& particles() const { return const_cast<World&>(world).attached().particles(*body); }
+
+  Real mean_tip_height(const Positions& x) const {
+    Real sum = 0;
+    for (int i : setup.tip) sum += x(1, i);
+    return setup.tip.empty() ? 0 : sum / static_cast<Real>(setup.tip.size());
+  }
+};
+
+Scene::Scene(SceneSetup setup, WorldKind world) : impl_(std::make_unique<Impl>(std::move(setup), world)) {}
+Scene::~Scene() = default;
+
+void Scene::step(Real duration) { impl_->world.world().stepSimulation(static_cast<btScalar>(duration), 0); }
+
+const SceneSetup& Scene::setup() const { return impl_->setup; }
+const PotentialField& Scene::field() const { return impl_->world.attached().field(*impl_->body); }
+const Particles& Scene::particles() const { return impl_->particles(); }
+const StepReport& Scene::report() const { return impl_->world.attached().report(*impl_->body); }
+
+Energies Scene::energies() const {
+  const Particles& p = particles();
+  Energies energies{.elastic = field().energy(p.positions), .kinetic = kinetic_energy(p)};
+  const Vector3& gravity = impl_->setup.gravity;
+  for (int i = 0; i < p.size(); ++i)
+    if (p.inverse_masses[i] > 0) energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
+  for (std::size_t b = 0; b < impl_->setup.balls.size(); ++b) {
+    const btRigidBody& rigid = *impl_->rigid_bodies[b];
+    const Real mass = impl_->setup.balls[b].mass, inertia = 0.4 * mass * std::pow(impl_->setup.balls[b].radius, 2);
+    energies.rigid_kinetic += mass / 2 * from_bullet(rigid.getLinearVelocity()).squaredNorm() +
+                              inertia / 2 * from_bullet(rigid.getAngularVelocity()).squaredNorm();
+    energies.gravitational -= mass * gravity.dot(from_bullet(rigid.getCenterOfMassPosition()));
+  }
+  return energies;
+}
+
+Momenta Scene::momenta() const {
+  const Particles& p = particles();
+  Momenta momenta{linear_momentum(p), angular_momentum(p)};
+  for (int i = 0; i < p.size(); ++i) {
+    if (!(p.inverse_masses[i] > 0)) continue;
+    const Real momentum = p.velocities.col(i).norm() / p.inverse_masses[i];
+    momenta.linear_scale += momentum;
+    momenta.angular_scale += momentum * p.positions.col(i).norm();
+  }
+  return momenta;
+}
+
+std::vector<RigidPose> Scene::balls() const {
+  std::vector<RigidPose> poses;
+  for (std::size_t b = 0; b < impl_->setup.balls.size(); ++b) {
+    const btTransform& transform = impl_->rigid_bodies[b]->getCenterOfMassTransform();
+    poses.push_back({from_bullet(transform.getBasis()), from_bullet(transform.getOrigin())});
+  }
+  return poses;
+}
+
+Real Scene::penetration() const {
+  const PackedVectors& x = particles().positions;
+  const std::vector<RigidPose> poses = balls();
+  Real deepest = 0;
+  for (const ContactPoint& point : impl_->contact_points) {
+    Vector3 position = Vector3::Zero();
+    for (int k = 0; k < point.num_particles; ++k) position += point.weights[k] * x.col(point.particles[k]).head<3>();
+    if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
+    for (std::size_t b = 0; b < poses.size(); ++b)
+      deepest = std::max(deepest, impl_->setup.balls[b].radius - (position - poses[b].position).norm());
+  }
+  return deepest;
+}
+
+Real Scene::tip_drop() const { return impl_->tip_start - impl_->mean_tip_height(particles().positions); }
+
+bool Scene::is_free() const {
+  const SceneSetup& setup = impl_->setup;
+  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.balls.empty() && setup.step.drag == 0;
+}
+
+}  // namespace penalty::demo

@@ -1,0 +1,56 @@
+#include "scenes/shape_measure.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace penalty::demo {
+
+ShapeMeasure::ShapeMeasure(const Eigen::Matrix3Xd& rest, std::span<const Tetrahedron> tetrahedra)
+    : rest_(rest),
+      tetrahedra_(tetrahedra.begin(), tetrahedra.end()),
+      edges_(edges_of(tetrahedra)),
+      volumes_(signed_volumes(rest, tetrahedra)) {
+  for (const auto& [a, b] : edges_) lengths_.push_back((rest.col(b) - rest.col(a)).norm());
+}
+
+ShapeErrors ShapeMeasure::errors(const Positions& x) const {
+  ShapeErrors errors;
+  const auto worst = [](Real& largest, Real error) {
+    if (!(error <= largest)) largest = error;  // a NaN stays visible
+  };
+  for (std::size_t e = 0; e < edges_.size(); ++e) {
+    const Vector3 d = (x.col(edges_[e][1]) - x.col(edges_[e][0])).head<3>();
+    const Real error = std::abs(d.norm() / lengths_[e] - 1);
+    errors.length_mean += error / static_cast<Real>(edges_.size());
+    worst(errors.length_max, error);
+  }
+  for (std::size_t t = 0; t < tetrahedra_.size(); ++t) {
+    const auto corner = [&](int k) -> Vector3 { return x.col(tetrahedra_[t][k]).head<3>(); };
+    const Vector3 origin = corner(0);
+    const Real volume = (corner(1) - origin).dot((corner(2) - origin).cross(corner(3) - origin)) / 6;
+    const Real error = std::abs(volume / volumes_[t] - 1);
+    errors.volume_mean += error / static_cast<Real>(tetrahedra_.size());
+    worst(errors.volume_max, error);
+    if (!(volume > 0)) ++errors.inverted;
+  }
+  return errors;
+}
+
+Real ShapeMeasure::rest_error(const Positions& x) const {
+  if (!x.allFinite()) return std::numeric_limits<Real>::quiet_NaN();
+  const Eigen::Matrix3Xd now = x.topRows<3>();
+  const Vector3 rest_mean = rest_.rowwise().mean(), mean = now.rowwise().mean();
+  // Kabsch: of all rotations R, V diag(1, 1, det) Uᵀ comes nearest, for sum (x - mean)(rest - mean)ᵀ = V S Uᵀ.
+  const Matrix3 covariance = (now.colwise() - mean) * (rest_.colwise() - rest_mean).transpose();
+  const Eigen::JacobiSVD<Matrix3> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Vector3 signs(1, 1, 1);
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) signs.z() = -1;
+  const Matrix3 rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3Xd best = (rotation * (rest_.colwise() - rest_mean)).colwise() + mean;
+  const Real diagonal = (rest_.rowwise().maxCoeff() - rest_.rowwise().minCoeff()).norm();
+  return (now - best).colwise().norm().maxCoeff() / diagonal;
+}
+
+}  // namespace penalty::demo

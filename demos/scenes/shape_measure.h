@@ -1,0 +1,35 @@
+// How far a body is from its rest shape: measured from the mesh alone, not through the potential that moves it.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "penalty/assembly/topology.h"
+
+namespace penalty::demo {
+
+struct ShapeErrors {
+  Real length_mean = 0, length_max = 0;  // |L - L0| / L0 over the edges
+  Real volume_mean = 0, volume_max = 0;  // |V - V0| / V0 over the tetrahedra
+  int inverted = 0;                      // tetrahedra of volume zero or less
+};
+
+class ShapeMeasure {
+ public:
+  ShapeMeasure(const Eigen::Matrix3Xd& rest, std::span<const Tetrahedron> tetrahedra);
+
+  ShapeErrors errors(const Positions& x) const;
+
+  /// Largest distance of a vertex to the rest shape after the best rotation and translation (least squares, never a
+  /// reflection), over the diagonal of the rest bounding box.
+  Real rest_error(const Positions& x) const;
+
+  std::size_t num_edges() const { return edges_.size(); }
+
+ private:
+  Eigen::Matrix3Xd rest_;
+  std::vector<Tetrahedron> tetrahedra_;
+  std::vector<Edge> edges_;
+  std::vector<Real> lengths_, volumes_;
+};
+
+}  // namespace penalty::demo

@@ -1,0 +1,146 @@
+// What a run leaves: the summary with its promised keys, the table, the curves, the pictures.
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "demo_program.h"
+
+namespace penalty::test {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Picture {
+  unsigned width = 0, height = 0;
+  std::vector<unsigned char> rgb;
+};
+
+Picture read_png(const std::filesystem::path& path) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  Picture picture;
+  if (!png_image_begin_read_from_file(&image, path.c_str())) return picture;
+  image.format = PNG_FORMAT_RGB;
+  picture.rgb.resize(PNG_IMAGE_SIZE(image));
+  if (!png_image_finish_read(&image, nullptr, picture.rgb.data(), 0, nullptr)) return {};
+  picture.width = image.width;
+  picture.height = image.height;
+  return picture;
+}
+
+Json summary_of(const std::string& arguments) {
+  const Outcome outcome = run_demo(words(arguments + " --no-render --summary -"));
+  EXPECT_EQ(outcome.status, 0) << outcome.errors;
+  return Json::parse(outcome.output);  // fails unless the JSON is alone
+}
+
+TEST(Summary, HasThePromisedKeys) {
+  const Json summary = summary_of("run drop --mesh box --cells 4 --stiffness 1 --duration 0.2 --seed 7");
+  for (const char* key : {"scene", "world", "integrator", "precision"}) EXPECT_TRUE(summary[key].is_string()) << key;
+  for (const char* key : {"seed", "steps", "inverted"}) EXPECT_TRUE(summary[key].is_number_integer()) << key;
+  for (const char* key : {"dt", "rest_error", "volume_error_peak_mean", "largest_energy_gain", "penetration"})
+    EXPECT_TRUE(summary[key].is_number()) << key;
+  for (const char* key : {"finite", "recovered"}) EXPECT_TRUE(summary[key].is_boolean()) << key;
+  EXPECT_TRUE(summary["mesh"]["source"].is_string());
+  for (const char* key : {"vertices", "tetrahedra", "edges"}) EXPECT_TRUE(summary["mesh"][key].is_number_integer()) << key;
+  for (const char* key : {"median", "max"}) EXPECT_GT(summary["ms_per_step"][key], 0) << key;
+  for (const char* key : {"initial", "peak", "final"}) EXPECT_TRUE(summary["energy"][key].is_number()) << key;
+  for (const char* error : {"length_error", "volume_error"})
+    for (const char* key : {"mean", "max"}) EXPECT_TRUE(summary[error][key].is_number()) << error;
+  EXPECT_TRUE(summary["momentum"]["linear"].is_null());  // gravity acts
+  EXPECT_TRUE(summary["momentum"]["angular"].is_null());
+
+  EXPECT_EQ(summary["scene"], "drop");
+  EXPECT_EQ(summary["integrator"], "explicit");
+  EXPECT_EQ(summary["precision"], PENALTY_PRECISION);
+  EXPECT_EQ(summary["seed"], 7);
+  EXPECT_EQ(summary["steps"], 12);
+  EXPECT_EQ(summary["mesh"]["tetrahedra"], 5 * 4 * 4 * 4);
+  EXPECT_EQ(summary["finite"], true);
+}
+
+TEST(Summary, NamesTheWorld) {
+  for (const char* world : {"classic", "deformable"})
+    EXPECT_EQ(summary_of(std::string("run flight --mesh box --cells 2 --duration 0.1 --world ") + world)["world"], world);
+}
+
+TEST(Summary, CountsRecoveredRuns) {
+  const Json summary = summary_of("run flight --mesh box --cells 4 --stiffness 1 --start squash --duration 4 --seed 3 --seeds 3");
+  EXPECT_EQ(summary["runs"], 3);
+  EXPECT_EQ(summary["recovered_runs"], 3);
+  EXPECT_EQ(summary["recovered"], true);
+  EXPECT_LT(summary["rest_error"], 1e-2);
+}
+
+TEST(Summary, TheBeamHangsAsDeepAsItShould) {
+  for (const char* world : {"classic", "deformable"}) {
+    const Json summary = summary_of(std::string("run beam --cells 16 --world ") + world);
+    EXPECT_NEAR(summary["tip_drop"], 0.2720, 0.0027) << world;  // one per cent of a converged integration
+    EXPECT_EQ(summary["inverted"], 0);
+  }
+}
+
+TEST(Summary, IsTheSameForTheSameSeed) {
+  const std::string run = "run drop --mesh ball --cells 6 --stiffness 1 --duration 1 --seed ";
+  Json one = summary_of(run + "5"), same = summary_of(run + "5"), other = summary_of(run + "6");
+  for (Json* json : {&one, &same, &other}) json->erase("ms_per_step");
+  EXPECT_EQ(one, same);
+  EXPECT_NE(one["energy"], other["energy"]);
+}
+
+TEST(Outputs, DataNeedsNoOpenGL) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = run_demo({"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.5", "--no-render", "--out",
+                                    (directory / "new/place").string()});
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  std::set<std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(directory / "new/place"))
+    files.insert(entry.path().filename().string());
+  EXPECT_EQ(files, (std::set<std::string>{"summary.json", "energies.csv", "energies.svg"}));
+  EXPECT_EQ(Json::parse(contents(directory / "new/place/summary.json"))["steps"], 30);
+  const std::string csv = contents(directory / "new/place/energies.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 30);  // names, start, steps
+  EXPECT_TRUE(csv.starts_with("time,elastic,kinetic,")) << csv.substr(0, 80);
+  EXPECT_NE(contents(directory / "new/place/energies.svg").find("<svg"), std::string::npos);
+}
+
+TEST(Outputs, PicturesShowTheScene) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = run_demo({"run", "drop", "--mesh", "ball", "--cells", "6", "--stiffness", "1", "--duration", "0.2",
+                                    "--out", directory.path().string()},
+                                   "LP_NUM_THREADS=1");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  const Picture still = read_png(directory / "drop.png");
+  ASSERT_EQ(still.width, 640u);
+  ASSERT_EQ(still.height, 360u);
+  std::set<unsigned> colors;
+  for (std::size_t i = 0; i + 2 < still.rgb.size(); i += 3)
+    colors.insert(still.rgb[i] << 16 | still.rgb[i + 1] << 8 | still.rgb[i + 2]);
+  EXPECT_GT(colors.size(), 1000u);  // a blank picture has one, a backdrop some hundred
+  if (std::filesystem::exists(directory / "drop.mp4")) {
+    const std::string clip = contents(directory / "drop.mp4");
+    EXPECT_GT(clip.size(), 2000u);
+    EXPECT_EQ(clip.substr(4, 4), "ftyp");
+  } else {  // without ffmpeg its frames
+    EXPECT_NE(outcome.errors.find("ffmpeg"), std::string::npos) << outcome.errors;
+  }
+}
+
+TEST(Outputs, WithoutFfmpegTheFramesAreKept) {
+  const TemporaryDirectory directory;
+  const Outcome outcome = run_demo({"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.1", "--out",
+                                    directory.path().string()},
+                                   "PATH=/nonexistent LP_NUM_THREADS=1");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  EXPECT_NE(outcome.errors.find("ffmpeg"), std::string::npos) << outcome.errors;
+  int frames = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path()))
+    frames += entry.path().filename().string().starts_with("frame_");
+  EXPECT_EQ(frames, 4);  // 0, 1/30, 2/30 and 3/30 s
+}
+
+}  // namespace
+}  // namespace penalty::test

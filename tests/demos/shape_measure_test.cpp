@@ -1,0 +1,52 @@
+#include "scenes/shape_measure.h"
+
+#include <gtest/gtest.h>
+
+#include "penalty/mesh/builders.h"
+
+namespace penalty::demo {
+namespace {
+
+struct Shape {
+  TetMesh mesh = make_box({1, 2, 3}, {2, 3, 4});
+  ShapeMeasure measure{mesh.vertices, mesh.tetrahedra};
+};
+
+TEST(ShapeMeasure, ARigidMotionIsNoError) {
+  const Shape shape;
+  const Matrix3 rotation = Eigen::AngleAxisd(2.1, Vector3(1, -2, 0.5).normalized()).toRotationMatrix();
+  const PackedVectors moved = pack((rotation * shape.mesh.vertices).colwise() + Vector3(5, -3, 7));
+  EXPECT_LT(shape.measure.rest_error(moved), 1e-14);
+  EXPECT_LT(shape.measure.errors(moved).length_max, 1e-13);
+  EXPECT_LT(shape.measure.errors(moved).volume_max, 1e-12);
+  EXPECT_EQ(shape.measure.errors(moved).inverted, 0);
+}
+
+TEST(ShapeMeasure, AScaledShapeErrsAsItsFactorsSay) {
+  const Shape shape;
+  const ShapeErrors errors = shape.measure.errors(pack(1.1 * shape.mesh.vertices));
+  EXPECT_NEAR(errors.length_mean, 0.1, 1e-13);
+  EXPECT_NEAR(errors.volume_max, 1.1 * 1.1 * 1.1 - 1, 1e-12);
+  // Corners are the farthest from the middle: half the diagonal, of which a tenth is gained.
+  EXPECT_NEAR(shape.measure.rest_error(pack(1.1 * shape.mesh.vertices)), 0.05, 1e-13);
+}
+
+TEST(ShapeMeasure, AReflectionIsNoRotation) {
+  const Shape shape;
+  const PackedVectors mirrored = pack(Vector3(-1, 1, 1).asDiagonal() * shape.mesh.vertices);
+  EXPECT_GT(shape.measure.rest_error(mirrored), 0.1);
+  EXPECT_EQ(shape.measure.errors(mirrored).inverted, static_cast<int>(shape.mesh.tetrahedra.size()));
+  EXPECT_LT(shape.measure.errors(mirrored).length_max, 1e-13);
+}
+
+TEST(ShapeMeasure, ShowsNotANumber) {
+  const Shape shape;
+  PackedVectors broken = pack(shape.mesh.vertices);
+  broken(1, 5) = std::numeric_limits<Real>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(shape.measure.rest_error(broken)));
+  EXPECT_TRUE(std::isnan(shape.measure.errors(broken).volume_mean));
+  EXPECT_GT(shape.measure.errors(broken).inverted, 0);
+}
+
+}  // namespace
+}  // namespace penalty::demo
