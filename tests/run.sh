@@ -1,0 +1,66 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds and runs all tests. Works on a bare Debian 12, as root or with sudo.
+#
+#   tests/run.sh [--preset release|debug|asan-ubsan|float64] [--jobs N] [--no-install] [-- CTEST_ARGUMENT...]
+#
+# --no-install leaves the packages alone. `tests/run.sh -- -R mesh` runs only the tests whose names contain "mesh". The last
+# line printed is the verdict; the status is 0 if everything passed, 1 if not, 2 for arguments that make no sense.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+preset=release
+jobs=$(nproc)
+install=yes
+ctest_arguments=()
+while [ $# -gt 0 ]; do
+  case $1 in
+    --preset) preset=${2:-}; shift ;;
+    --jobs) jobs=${2:-}; shift ;;
+    --no-install) install=no ;;
+    --) shift; ctest_arguments=("$@"); break ;;
+    -h | --help) sed -n '2,7s/^# \{0,1\}//p' tests/run.sh; exit 0 ;;
+    *) echo "tests/run.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
+  esac
+  shift || true
+done
+if ! grep -q "\"name\": \"$preset\", \"configurePreset\"" CMakePresets.json; then
+  echo "tests/run.sh: unknown preset '$preset'; there are: $(sed -n '/"buildPresets"/,/\]/s/.*"name": "\([^"]*\)".*/\1/p' CMakePresets.json | paste -sd' ')" >&2
+  exit 2
+fi
+[[ $jobs =~ ^[1-9][0-9]*$ ]] || { echo "tests/run.sh: --jobs is '$jobs', must be a positive number" >&2; exit 2; }
+
+stage="starting"
+log=$(mktemp)
+finish() {
+  local status=$?
+  local summary
+  summary=$(grep -E '^[0-9]+% tests passed' "$log" || true)
+  rm -f "$log"
+  if [ "$status" -eq 0 ]; then
+    echo "tests/run.sh: PASSED ($preset, ${summary##*out of } tests, $SECONDS s)"
+  elif [ -n "$summary" ]; then
+    echo "tests/run.sh: FAILED ($preset, $summary, $SECONDS s)"
+    exit 1
+  else
+    echo "tests/run.sh: FAILED while $stage ($preset, $SECONDS s)"
+    exit 1
+  fi
+}
+trap finish EXIT
+trap 'exit 1' INT TERM
+step() {
+  stage=$1
+  echo "tests/run.sh: $stage"
+}
+
+if [ "$install" = yes ]; then
+  step "installing packages"
+  bash third_party_notes/install.sh tests
+fi
+step "configuring build/$preset"
+cmake --preset "$preset" -D BULLET_PENALTY_BUILD_TESTS=ON -D BULLET_PENALTY_BUILD_DEMOS=ON
+step "building with $jobs jobs"
+cmake --build --preset "$preset" --parallel "$jobs"
+step "testing with $jobs jobs"
+# A software renderer would otherwise start a thread for each core, in each of the parallel tests.
+LP_NUM_THREADS=1 ctest --preset "$preset" --parallel "$jobs" --no-tests=error "${ctest_arguments[@]}" 2>&1 | tee "$log"

@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# third_party_notes/install.sh demos|tests: installs the Debian packages that the demos or the tests need and that are not
+# there yet. Needs root, or sudo, only if something is missing. This is the one place that lists the packages; README.md
+# beside it says what each of them is.
+set -euo pipefail
+say() { echo "install.sh: $*"; }
+
+build=(g++ cmake ninja-build pkg-config libbullet-dev libeigen3-dev libgtest-dev)  # a plain configure includes the tests
+demos=(libassimp-dev libcli11-dev nlohmann-json3-dev libpng-dev libstb-dev libgl-dev libosmesa6 fonts-dejavu-core ffmpeg
+       glmark2-data)
+tests=(libbenchmark-dev libegl1 libgl1-mesa-dri)
+
+case "${1:-}" in
+  demos) wanted=("${build[@]}" "${demos[@]}") ;;
+  tests) wanted=("${build[@]}" "${demos[@]}" "${tests[@]}") ;;
+  *) echo "usage: $0 demos|tests" >&2; exit 2 ;;
+esac
+
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  say "not a Debian system: nothing is installed. Needed, by their Debian names: ${wanted[*]}"
+  exit 0
+fi
+
+is_installed() { [ "$(dpkg-query -W -f='${db:Status-Status}\n' "$1" 2>/dev/null | sort -u)" = installed ]; }
+missing=()
+for package in "${wanted[@]}"; do
+  is_installed "$package" || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  say "all ${#wanted[@]} packages are there"
+  exit 0
+fi
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    say "not root, and there is no sudo. As root: apt-get install --no-install-recommends ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+apt() {  # quiet unless it fails
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Dpkg::Use-Pty=0 -o Acquire::Retries=3 "$@" >"$log" 2>&1 || {
+    tail -n 20 "$log" >&2
+    say "apt-get $1 failed" >&2
+    exit 1
+  }
+}
+say "missing: ${missing[*]}"
+say "updating the package lists"
+apt update
+apt install --no-install-recommends --simulate "${missing[@]}"
+say "installing $(grep -c '^Inst ' "$log" || true) packages with all they depend on: some minutes"
+start=$SECONDS
+apt install --no-install-recommends "${missing[@]}"
+say "installed in $((SECONDS - start)) s"
