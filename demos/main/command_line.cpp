@@ -37,7 +37,8 @@ void require_not_negative(const std::optional<Real>& value, const std::string& o
   if (value) require(*value >= 0 && std::isfinite(*value), option, *value, "finite and not negative");
 }
 
-std::optional<int> whole(const std::optional<long long>& value, const std::string& option, long long low, long long high) {
+std::optional<int> whole(const std::optional<long long>& value, const std::string& option, long long low,
+                         long long high) {
   if (!value) return {};
   require(*value >= low && *value <= high, option, static_cast<Real>(*value),
           std::to_string(low) + " to " + std::to_string(high));
@@ -58,8 +59,8 @@ long num_steps(Real duration, Real rate) {
   if (steps < 1)
     throw UsageError("--duration " + shown(duration) + " at --rate " + shown(rate) + " is less than one step");
   if (!(steps <= most_steps))
-    throw UsageError("--duration " + shown(duration) + " at --rate " + shown(rate) + " is more than " + shown(most_steps) +
-                     " steps");
+    throw UsageError("--duration " + shown(duration) + " at --rate " + shown(rate) + " is more than " +
+                     shown(most_steps) + " steps");
   return static_cast<long>(steps);
 }
 
@@ -79,8 +80,9 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_option("scene", options.scene, "One of the scenes of `penalty-demo list`")->required()->type_name("SCENE");
   run->add_option("--world", world, "Bullet's world: classic or deformable")->type_name("NAME");
   run->add_option("--integrator", options.integrator, "auto, explicit or implicit")->type_name("NAME");
-  run->add_option("--mesh", scene.mesh,
-                  "Tetrahedra (.vtk, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
+  run->add_option(
+         "--mesh", scene.mesh,
+         "Tetrahedra (.vtk, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
       ->type_name("FILE");
   run->add_flag("--no-scale", no_scale, "Keep the size of the mesh, else 2 m along its longest side");
   run->add_option("--cells", cells, "Cells along the longest side, where the scene makes the mesh")->type_name("N");
@@ -97,10 +99,12 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_option("--seeds", seeds, "Runs with this many seeds, from --seed on")->type_name("N");
   run->add_option("--rate", options.rate, "World steps a second")->type_name("HZ");
   run->add_option("--duration", options.duration, "Simulated time [s]")->type_name("S");
-  run->add_option("--out", out, "Directory for still, clip, summary.json, energies.csv and energies.svg")->type_name("DIR");
+  run->add_option("--out", out, "Directory for still, clip, summary.json, energies.csv and energies.svg")
+      ->type_name("DIR");
   run->add_option("--quality", quality, "Of the pictures: preview, video or still")->type_name("NAME");
   run->add_option("--gl", backend, "Off-screen OpenGL: auto, osmesa or egl")->type_name("NAME");
-  run->add_option("--color", coloring, "Colours show energy (density) or strain (mean |C| of the edges)")->type_name("NAME");
+  run->add_option("--color", coloring, "Colours show energy (density) or strain (mean |C| of the edges)")
+      ->type_name("NAME");
   run->add_option("--still", options.still, "Moment of the still [s]; else the end")->type_name("S");
   run->add_flag("--no-render", no_render, "No pictures: needs no OpenGL");
   run->add_option("--summary", options.summary, "Where the summary goes as JSON; -: alone on standard output")

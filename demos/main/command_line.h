@@ -25,20 +25,20 @@ struct RunOptions {
   WorldKind world = WorldKind::classic;
   std::string integrator = "auto";
   SceneOptions scene_options;
-  int seeds = 0;                   // 0: one run, no statistics
-  Real rate = 60;                  // world steps a second
-  std::optional<Real> duration;    // [s]
+  int seeds = 0;                 // 0: one run, no statistics
+  Real rate = 60;                // world steps a second
+  std::optional<Real> duration;  // [s]
   std::optional<std::filesystem::path> out;
   std::optional<std::string> summary;  // a file, or "-"
   render::Quality quality = render::Quality::preview;
   render::Backend backend = render::Backend::automatic;
   bool render = true;
   Coloring coloring = Coloring::energy;
-  std::optional<Real> still;       // [s]
+  std::optional<Real> still;  // [s]
 };
 
 struct CommandLine {
-  std::string text;                 // to be printed on standard output, then done: help, version, the list of scenes
+  std::string text;  // to be printed on standard output, then done: help, version, the list of scenes
   std::optional<RunOptions> run;
 };
 

@@ -28,8 +28,10 @@ std::optional<std::ofstream> open_summary(const RunOptions& options) {
 void make_directory(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
-  if (!std::filesystem::is_directory(directory)) throw UsageError("--out " + directory.string() + ": cannot be made a directory");
-  if (!std::ofstream(directory / "summary.json")) throw UsageError("--out " + directory.string() + ": cannot be written to");
+  if (!std::filesystem::is_directory(directory))
+    throw UsageError("--out " + directory.string() + ": cannot be made a directory");
+  if (!std::ofstream(directory / "summary.json"))
+    throw UsageError("--out " + directory.string() + ": cannot be written to");
 }
 
 BodyMesh load(const SceneEntry& entry, const SceneOptions& options) try {
@@ -73,7 +75,8 @@ Status run(RunOptions options) {
       Recording recording =
           record(*scene, options, steps, frames, [&](long step) { progress.advance_to(r * steps + step); });
       recovered += recording.recovered();
-      each_seed.push_back({{"seed", recording.seed}, {"rest_error", recording.rest_error}, {"recovered", recording.recovered()}});
+      each_seed.push_back(
+          {{"seed", recording.seed}, {"rest_error", recording.rest_error}, {"recovered", recording.recovered()}});
       if (!worst || worse(recording, *worst)) worst = std::move(recording);
       ++options.scene_options.seed;
     }

@@ -24,7 +24,8 @@ void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>&
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");
 }
 
-void write_energy_plot(const std::filesystem::path& path, const std::string& title, const std::vector<StepRecord>& steps) {
+void write_energy_plot(const std::filesystem::path& path, const std::string& title,
+                       const std::vector<StepRecord>& steps) {
   std::vector<double> time;
   for (const StepRecord& step : steps) time.push_back(step.time);
   render::Plot plot{.title = title, .x_label = "time [s]", .y_label = "energy [J]", .series = {}};

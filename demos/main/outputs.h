@@ -10,6 +10,7 @@ namespace penalty::demo {
 void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>& steps);
 
 /// Energies over time.
-void write_energy_plot(const std::filesystem::path& path, const std::string& title, const std::vector<StepRecord>& steps);
+void write_energy_plot(const std::filesystem::path& path, const std::string& title,
+                       const std::vector<StepRecord>& steps);
 
 }  // namespace penalty::demo

@@ -91,7 +91,8 @@ class Stage {
 
   render::Inset curves(Real until) const {
     double high = 0;
-    for (const StepRecord& step : recording_.steps) high = std::max({high, step.energies.elastic, step.energies.kinetic});
+    for (const StepRecord& step : recording_.steps)
+      high = std::max({high, step.energies.elastic, step.energies.kinetic});
     const double scale = high >= 1e4 ? 1e3 : 1;
     render::Inset inset{.title = scale > 1 ? "energy [kJ]" : "energy [J]", .series = {}};
     render::Series elastic{.name = "elastic", .color = render::palette(1), .x = {}, .y = {}};
@@ -128,7 +129,8 @@ render::Metadata metadata(const RunOptions& options, const Recording& recording,
 std::string draw(const Recording& recording, const RunOptions& options, const SceneSetup& setup, const FramePlan& plan,
                  const std::filesystem::path& directory, const std::function<void(long)>& progress) {
   const Stage stage(recording, options, setup);
-  const render::View view{.azimuth = setup.look.azimuth, .elevation = setup.look.elevation, .left = -0.62};  // beside the curves
+  const render::View view{
+      .azimuth = setup.look.azimuth, .elevation = setup.look.elevation, .left = -0.62};  // beside the curves
   std::string remarks;
 
   const Real wanted = options.still.value_or(setup.look.still_time);
@@ -162,7 +164,8 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
   }
   video.finish();
   if (!video.encoded())
-    remarks = "no ffmpeg: the frames are in " + video.frames_directory().string() + "; encode them with " + video.command();
+    remarks =
+        "no ffmpeg: the frames are in " + video.frames_directory().string() + "; encode them with " + video.command();
   return remarks;
 }
 

@@ -9,7 +9,8 @@
 namespace penalty::demo {
 
 /// Writes `<scene>.png` and `<scene>.mp4` into `directory`; `progress` is told how many pictures are done, the still
-/// first. Returns a remark for the user, or nothing: where ffmpeg is missing, what makes the clip of its frames. Throws std::runtime_error if there is no off-screen OpenGL or a file cannot be written.
+/// first. Returns a remark for the user, or nothing: where ffmpeg is missing, what makes the clip of its frames. Throws
+/// std::runtime_error if there is no off-screen OpenGL or a file cannot be written.
 std::string draw(const Recording& recording, const RunOptions& options, const SceneSetup& setup, const FramePlan& plan,
                  const std::filesystem::path& directory, const std::function<void(long)>& progress);
 

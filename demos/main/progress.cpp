@@ -9,7 +9,11 @@ namespace penalty::demo {
 using Seconds = std::chrono::duration<double>;
 
 Progress::Progress(std::string what, long total)
-    : what_(std::move(what)), total_(total), terminal_(isatty(STDERR_FILENO) == 1), start_(Clock::now()), last_(start_) {}
+    : what_(std::move(what)),
+      total_(total),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      start_(Clock::now()),
+      last_(start_) {}
 
 Progress::~Progress() {
   if (terminal_ && drawn_) std::fputs("\r\033[K", stderr);

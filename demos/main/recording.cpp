@@ -44,7 +44,8 @@ Eigen::VectorXd energy_densities(const Scene& scene) {
     if (!batch) return;
     std::vector<Real> c;
     batch->append_values(scene.particles().positions, c);
-    for (std::size_t e = 0; e < c.size(); ++e) mean.add(batch->stencils()[e], batch->stiffnesses()[e] / 2 * c[e] * c[e], 0);
+    for (std::size_t e = 0; e < c.size(); ++e)
+      mean.add(batch->stencils()[e], batch->stiffnesses()[e] / 2 * c[e] * c[e], 0);
   };
   add(scene.field().find<Length>());
   add(scene.field().find<TetrahedronVolume>());

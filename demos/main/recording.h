@@ -11,11 +11,11 @@ namespace penalty::demo {
 
 /// After a step, or at the start.
 struct StepRecord {
-  Real time = 0;          // [s]
+  Real time = 0;  // [s]
   Energies energies;
   ShapeErrors errors;
-  Real penetration = 0;   // below the true rigid surfaces [m]
-  Real contact_depth = 0; // below the planes of contact, which lie a margin outside [m]
+  Real penetration = 0;    // below the true rigid surfaces [m]
+  Real contact_depth = 0;  // below the planes of contact, which lie a margin outside [m]
   int substeps = 0, retries = 0;
   Real milliseconds = 0;  // CPU time of the world step
   Real tip_drop = 0;      // [m]
@@ -36,13 +36,13 @@ struct Recording {
   Real rest_error = 0;
   std::optional<Real> linear_drift, angular_drift;  // relative; empty where something from outside acts
   bool finite = true;
-  std::string failure;              // where a run that turned non-finite did so
+  std::string failure;  // where a run that turned non-finite did so
   bool recovered() const { return finite && rest_error < 1e-2; }
 };
 
 /// Clips show 30 frames a second, or each step of a slower world; of a long run they are a time lapse.
 struct FramePlan {
-  Real interval = 0;          // of simulated time between frames [s]; 0: none are kept
+  Real interval = 0;  // of simulated time between frames [s]; 0: none are kept
   Real frames_per_second = 30;
 };
 FramePlan plan_frames(Real duration, Real rate);

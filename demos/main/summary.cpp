@@ -49,9 +49,9 @@ std::optional<Real> settling_time(const std::vector<StepRecord>& steps) {
   return first->time;
 }
 
-/// Mean of the tip's drop between 1 and 2 s: of its values at 16/15, 17/15, ... 30/15 s, which is how the reference figures
-/// 0.2720 m (16 cells) and 0.3518 m (32 cells) were taken; the beam swings about once a second, so that samples matter.
-/// Null for a shorter run.
+/// Mean of the tip's drop between 1 and 2 s: of its values at 16/15, 17/15, ... 30/15 s, which is how the reference
+/// figures 0.2720 m (16 cells) and 0.3518 m (32 cells) were taken; the beam swings about once a second, so that samples
+/// matter. Null for a shorter run.
 std::optional<Real> mean_tip_drop(const std::vector<StepRecord>& steps) {
   Real sum = 0;
   std::size_t after = 1;
@@ -131,10 +131,11 @@ std::string describe(const Json& summary) {
        << "  at the end: rest error " << summary["rest_error"] << ", volume error " << summary["volume_error"]["mean"]
        << " in the mean, " << summary["inverted"] << " inverted\n";
   if (!summary["momentum"]["linear"].is_null())
-    text << "  momentum drift: linear " << summary["momentum"]["linear"] << ", angular " << summary["momentum"]["angular"]
-         << '\n';
+    text << "  momentum drift: linear " << summary["momentum"]["linear"] << ", angular "
+         << summary["momentum"]["angular"] << '\n';
   if (summary.contains("tip_drop")) text << "  tip drop [m]: " << summary["tip_drop"] << '\n';
-  if (summary.contains("runs")) text << "  " << summary["recovered_runs"] << " of " << summary["runs"] << " runs recovered\n";
+  if (summary.contains("runs"))
+    text << "  " << summary["recovered_runs"] << " of " << summary["runs"] << " runs recovered\n";
   return text.str();
 }
 

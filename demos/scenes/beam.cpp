@@ -11,7 +11,8 @@ namespace {
 
 constexpr Real young = 1e7, density = 1000, drag = 0.1;
 
-/// Springs of k = 0.4 E h on the edges, h the side of a cell, and E / V0 on the volumes: K_L = 0.4 E h L0² and K_V = E V0.
+/// Springs of k = 0.4 E h on the edges, h the side of a cell, and E / V0 on the volumes: K_L = 0.4 E h L0² and K_V = E
+/// V0.
 PotentialField reference_field(const TetMesh& mesh, Real cell) {
   PotentialField field(mesh.vertices);
   const std::vector<Edge> edges = edges_of(mesh.tetrahedra);
@@ -31,7 +32,8 @@ BodyMesh beam_body(const SceneOptions& options) {
   if (!options.mesh.empty()) throw std::invalid_argument("scene beam makes its own mesh: --mesh does not apply");
   const int cells = options.cells.value_or(32);
   if (cells < 4 || cells > 200 || cells % 4 != 0)
-    throw std::invalid_argument("--cells is " + std::to_string(cells) + ", must be a multiple of 4 from 4 to 200 for the beam");
+    throw std::invalid_argument("--cells is " + std::to_string(cells) +
+                                ", must be a multiple of 4 from 4 to 200 for the beam");
   return {make_beam(cells / 4), {}};
 }
 

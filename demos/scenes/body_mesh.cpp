@@ -11,9 +11,9 @@
 namespace penalty::demo {
 namespace {
 
-constexpr Real size = 2;               // of a scaled mesh, along its longest side [m]
-constexpr int lattice_cells = 20;      // of an embedded surface, unless the user says otherwise
-constexpr Real samples_per_cell = 1.6; // contact points along the side of a lattice cell
+constexpr Real size = 2;                // of a scaled mesh, along its longest side [m]
+constexpr int lattice_cells = 20;       // of an embedded surface, unless the user says otherwise
+constexpr Real samples_per_cell = 1.6;  // contact points along the side of a lattice cell
 
 /// Moves the bounding box to the origin and, if `scale`, gives its longest side the standard length.
 void place(Eigen::Matrix3Xd& vertices, bool scale) {

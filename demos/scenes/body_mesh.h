@@ -24,8 +24,8 @@ struct BodyMesh {
 /// The Stanford bunny as Debian's package glmark2-data brings it.
 std::filesystem::path bunny_path();
 
-/// The mesh of `options.mesh`, or of `by_default`, about the origin. Throws MeshError for a file that is no usable mesh and
-/// std::invalid_argument for an unknown name or an impossible number of cells; both say it in one line.
+/// The mesh of `options.mesh`, or of `by_default`, about the origin. Throws MeshError for a file that is no usable mesh
+/// and std::invalid_argument for an unknown name or an impossible number of cells; both say it in one line.
 BodyMesh load_body(const SceneOptions& options, const std::string& by_default);
 
 }  // namespace penalty::demo

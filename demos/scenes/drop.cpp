@@ -10,17 +10,19 @@
 namespace penalty::demo {
 namespace {
 
-constexpr Real height = 2;                                                     // of the lowest point [m]
+constexpr Real height = 2;  // of the lowest point [m]
 constexpr Material jelly{.young = 4e5, .poisson = 0.4, .density = 1000};
-constexpr Real jelly_damping = 0.01;                                           // [s]
+constexpr Real jelly_damping = 0.01;  // [s]
 constexpr int num_balls = 11;
-constexpr Real ball_density = 1;                                               // of the soft body's
+constexpr Real ball_density = 1;  // of the soft body's
 
-/// Balls on the ground, spread like the seeds of a sunflower: never touching, and no rows. The middle stays free, so that a
-/// body of 2 m comes down between them.
+/// Balls on the ground, spread like the seeds of a sunflower: never touching, and no rows. The middle stays free, so
+/// that a body of 2 m comes down between them.
 std::vector<Ball> scattered(int count, Real density, std::uint32_t seed) {
   std::mt19937_64 random(seed);
-  const auto uniform = [&random](Real low, Real high) { return low + (high - low) * static_cast<Real>(random() >> 11) * 0x1p-53; };
+  const auto uniform = [&random](Real low, Real high) {
+    return low + (high - low) * static_cast<Real>(random() >> 11) * 0x1p-53;
+  };
   const Real turn = uniform(0, 2 * std::numbers::pi), golden = std::numbers::pi * (3 - std::sqrt(5.0));
   constexpr Real spacing = 0.72, first = 2.2;
   std::vector<Ball> balls;

@@ -5,10 +5,10 @@
 namespace penalty::demo {
 namespace {
 
-constexpr Real stiffness = 0.1;     // of every constraint [J]
-constexpr Real stretch = 1.2;       // along x
-constexpr Real safety = 0.4;        // small substeps: the energy then swings by less than it is plotted with
-constexpr Real hard_damping = 0.01; // of a start far from rest, which otherwise would never find back [s]
+constexpr Real stiffness = 0.1;      // of every constraint [J]
+constexpr Real stretch = 1.2;        // along x
+constexpr Real safety = 0.4;         // small substeps: the energy then swings by less than it is plotted with
+constexpr Real hard_damping = 0.01;  // of a start far from rest, which otherwise would never find back [s]
 
 }  // namespace
 

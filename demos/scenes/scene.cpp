@@ -29,8 +29,8 @@ Matrix3 from_bullet(const btMatrix3x3& m) {
   return result;
 }
 
-/// Either world of Bullet with the plugin's solver in it. Members are destroyed from the last to the first: the world goes
-/// before the solvers it points to.
+/// Either world of Bullet with the plugin's solver in it. Members are destroyed from the last to the first: the world
+/// goes before the solvers it points to.
 class World {
  public:
   explicit World(WorldKind kind) : dispatcher_(&configuration_) {
@@ -180,7 +180,8 @@ Energies Scene::energies() const {
   Energies energies{.elastic = field().energy(p.positions), .kinetic = kinetic_energy(p)};
   const Vector3& gravity = impl_->setup.gravity;
   for (int i = 0; i < p.size(); ++i)
-    if (p.inverse_masses[i] > 0) energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
+    if (p.inverse_masses[i] > 0)
+      energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
   for (std::size_t b = 0; b < impl_->setup.balls.size(); ++b) {
     const btRigidBody& rigid = *impl_->rigid_bodies[b];
     const Real mass = impl_->setup.balls[b].mass, inertia = 0.4 * mass * std::pow(impl_->setup.balls[b].radius, 2);
@@ -230,7 +231,8 @@ Real Scene::tip_drop() const { return impl_->tip_start - impl_->mean_tip_height(
 
 bool Scene::is_free() const {
   const SceneSetup& setup = impl_->setup;
-  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.balls.empty() && setup.step.drag == 0;
+  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.balls.empty() &&
+         setup.step.drag == 0;
 }
 
 }  // namespace penalty::demo

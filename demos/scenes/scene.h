@@ -23,7 +23,7 @@ struct RigidPose {
 
 /// Momenta of everything that moves, and the sums of magnitudes that they are to be compared with.
 struct Momenta {
-  Vector3 linear, angular;                 // angular: about the origin [kg m/s], [kg m²/s]
+  Vector3 linear, angular;  // angular: about the origin [kg m/s], [kg m²/s]
   Real linear_scale = 0, angular_scale = 0;
 };
 

@@ -11,9 +11,9 @@ namespace penalty::demo {
 
 enum class WorldKind { classic, deformable };
 
-/// How a body starts; its rest shape stays what it is. `squash` leaves a fifth of the height, `plane`, `line` and `point`
-/// nothing of one, two and three directions, `mirror` turns every tetrahedron inside-out, `scramble` puts each vertex
-/// anywhere in the bounding box.
+/// How a body starts; its rest shape stays what it is. `squash` leaves a fifth of the height, `plane`, `line` and
+/// `point` nothing of one, two and three directions, `mirror` turns every tetrahedron inside-out, `scramble` puts each
+/// vertex anywhere in the bounding box.
 enum class Start { rest, squash, plane, line, point, mirror, scramble };
 
 /// Throw std::invalid_argument that names the choices.
@@ -24,15 +24,15 @@ std::string_view name_of(Start start);
 
 /// Whatever is empty is left to the scene.
 struct SceneOptions {
-  std::string mesh{};              // a file, or "torus", "ball", "box", "bunny"
-  bool scale = true;               // to 2 m along the longest side
-  std::optional<int> cells{};      // along the longest side
-  std::optional<Real> stiffness{}; // K of every constraint [J], with a mass of 1 kg
-  std::optional<Real> young{};     // [Pa], with the mass that follows from the density
+  std::string mesh{};               // a file, or "torus", "ball", "box", "bunny"
+  bool scale = true;                // to 2 m along the longest side
+  std::optional<int> cells{};       // along the longest side
+  std::optional<Real> stiffness{};  // K of every constraint [J], with a mass of 1 kg
+  std::optional<Real> young{};      // [Pa], with the mass that follows from the density
   std::optional<Real> poisson{};
-  std::optional<Real> damping{};   // ratio of damping to stiffness [s]
-  std::optional<Real> drag{};      // [1/s]
-  std::optional<int> substeps{};   // in a step; empty: from the stability limit
+  std::optional<Real> damping{};  // ratio of damping to stiffness [s]
+  std::optional<Real> drag{};     // [1/s]
+  std::optional<int> substeps{};  // in a step; empty: from the stability limit
   std::optional<int> spheres{};
   Start start = Start::rest;
   std::uint32_t seed = 1;

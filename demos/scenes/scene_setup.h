@@ -26,21 +26,21 @@ struct SceneSetup {
   std::string name;
   BodyMesh body;
   PotentialField field;
-  Real mass = 1;                             // of the soft body, the same for every vertex [kg]
-  Eigen::Matrix3Xd positions, velocities;    // at the start, 3 x vertices [m], [m/s]
-  std::vector<int> pinned;                   // vertices that nothing moves
-  Vector3 gravity = Vector3::Zero();         // [m/s²]
-  bool ground = false;                       // a static box whose top is y = 0
-  std::vector<Ball> balls;                   // rigid and free
+  Real mass = 1;                           // of the soft body, the same for every vertex [kg]
+  Eigen::Matrix3Xd positions, velocities;  // at the start, 3 x vertices [m], [m/s]
+  std::vector<int> pinned;                 // vertices that nothing moves
+  Vector3 gravity = Vector3::Zero();       // [m/s²]
+  bool ground = false;                     // a static box whose top is y = 0
+  std::vector<Ball> balls;                 // rigid and free
   StepOptions step;
-  std::vector<int> tip;                      // vertices whose mean drop is followed
+  std::vector<int> tip;  // vertices whose mean drop is followed
   Look look;
 };
 
 struct SceneEntry {
   std::string_view name, description;
-  Real duration;                                                 // unless the user says otherwise [s]
-  BodyMesh (*body)(const SceneOptions&);                         // may take a second; does not depend on the seed
+  Real duration;                          // unless the user says otherwise [s]
+  BodyMesh (*body)(const SceneOptions&);  // may take a second; does not depend on the seed
   SceneSetup (*setup)(const SceneOptions&, const BodyMesh&);
 };
 

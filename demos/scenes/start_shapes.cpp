@@ -25,7 +25,8 @@ auto look_up(const Table& table, std::string_view what, std::string_view name) {
     if (key == name) return value;
     choices += (choices.empty() ? "" : ", ") + std::string(key);
   }
-  throw std::invalid_argument("unknown " + std::string(what) + " \"" + std::string(name) + "\", must be one of " + choices);
+  throw std::invalid_argument("unknown " + std::string(what) + " \"" + std::string(name) + "\", must be one of " +
+                              choices);
 }
 
 template <class Table, class Value>
@@ -48,13 +49,20 @@ Eigen::Matrix3Xd start_positions(const Eigen::Matrix3Xd& rest, Start start, std:
     return (Vector3(x, y, z).asDiagonal() * (rest.colwise() - middle)).colwise() + middle;
   };
   switch (start) {
-    case Start::rest: return rest;
-    case Start::squash: return scaled(1, 0.2, 1);
-    case Start::plane: return scaled(1, 0, 1);
-    case Start::line: return scaled(1, 0, 0);
-    case Start::point: return scaled(0, 0, 0);
-    case Start::mirror: return scaled(-1, 1, 1);
-    case Start::scramble: break;
+    case Start::rest:
+      return rest;
+    case Start::squash:
+      return scaled(1, 0.2, 1);
+    case Start::plane:
+      return scaled(1, 0, 1);
+    case Start::line:
+      return scaled(1, 0, 0);
+    case Start::point:
+      return scaled(0, 0, 0);
+    case Start::mirror:
+      return scaled(-1, 1, 1);
+    case Start::scramble:
+      break;
   }
   // Not std::uniform_real_distribution, which every library fills in its own way: the same seed is the same start.
   std::mt19937_64 random(seed);

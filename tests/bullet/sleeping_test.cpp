@@ -17,7 +17,7 @@ class Sleeping : public WorldTest {
 
   // Seconds until all the objects sleep, or -1.
   Real time_to_sleep(std::initializer_list<const btCollisionObject*> objects) {
-    for (int step = 1; step <= 1200; ++step) {
+    for (int step = 1; step <= 3600; ++step) {
       sim.step(frame);
       bool all = true;
       for (const btCollisionObject* object : objects) all = all && object->getActivationState() == ISLAND_SLEEPING;

@@ -22,30 +22,48 @@ struct Misuse {
 };
 
 TEST(CommandLine, RefusesWhatItDoesNotKnow) {
-  for (const Misuse& misuse : {Misuse{"", "subcommand"}, Misuse{"run", "scene"}, Misuse{"run nothing", "drop, beam, flight"},
-                               Misuse{"run drop --bogus", "--bogus"}, Misuse{"run drop --world moon", "classic, deformable"},
-                               Misuse{"run drop --integrator rk4", "auto, explicit, implicit"},
-                               Misuse{"run drop --integrator implicit", "explicit step only"},
-                               Misuse{"run drop --start upside", "scramble"}, Misuse{"run drop --gl vulkan", "osmesa"},
-                               Misuse{"run drop --quality ultra", "preview"}, Misuse{"run drop --color grey", "strain"},
-                               Misuse{"run drop --mesh dragon", "dragon"}, Misuse{"list all", "all"}}) {
+  for (const Misuse& misuse :
+       {Misuse{"", "subcommand"}, Misuse{"run", "scene"}, Misuse{"run nothing", "drop, beam, flight"},
+        Misuse{"run drop --bogus", "--bogus"}, Misuse{"run drop --world moon", "classic, deformable"},
+        Misuse{"run drop --integrator rk4", "auto, explicit, implicit"},
+        Misuse{"run drop --integrator implicit", "explicit step only"}, Misuse{"run drop --start upside", "scramble"},
+        Misuse{"run drop --gl vulkan", "osmesa"}, Misuse{"run drop --quality ultra", "preview"},
+        Misuse{"run drop --color grey", "strain"}, Misuse{"run drop --mesh dragon", "dragon"},
+        Misuse{"list all", "all"}}) {
     SCOPED_TRACE(misuse.arguments);
     expect_refusal(run_demo(words(misuse.arguments)), misuse.mentions);
   }
 }
 
 TEST(CommandLine, RefusesImpossibleNumbers) {
-  for (const Misuse& misuse :
-       {Misuse{"--rate 0", "--rate"}, Misuse{"--rate -60", "-60"}, Misuse{"--rate nan", "nan"}, Misuse{"--rate inf", "inf"},
-        Misuse{"--rate many", "many"}, Misuse{"--duration 0", "--duration"}, Misuse{"--duration nan", "nan"},
-        Misuse{"--duration 1e99", "steps"}, Misuse{"--duration 1e-9", "step"}, Misuse{"--stiffness 0", "--stiffness"},
-        Misuse{"--stiffness -1", "-1"}, Misuse{"--stiffness nan", "nan"}, Misuse{"--young inf", "inf"},
-        Misuse{"--poisson 0.5", "oisson"}, Misuse{"--young 1e5 --stiffness 1", "excludes"}, Misuse{"--damping -1", "--damping"},
-        Misuse{"--drag nan", "nan"}, Misuse{"--substeps -1", "--substeps"}, Misuse{"--spheres -1", "--spheres"},
-        Misuse{"--spheres 1e9", "--spheres"}, Misuse{"--seed -1", "--seed"}, Misuse{"--seeds 0", "--seeds"},
-        Misuse{"--cells 0", "--cells"}, Misuse{"--cells 100000", "--cells"}, Misuse{"--still -1", "--still"}}) {
+  for (const Misuse& misuse : {Misuse{"--rate 0", "--rate"},
+                               Misuse{"--rate -60", "-60"},
+                               Misuse{"--rate nan", "nan"},
+                               Misuse{"--rate inf", "inf"},
+                               Misuse{"--rate many", "many"},
+                               Misuse{"--duration 0", "--duration"},
+                               Misuse{"--duration nan", "nan"},
+                               Misuse{"--duration 1e99", "steps"},
+                               Misuse{"--duration 1e-9", "step"},
+                               Misuse{"--stiffness 0", "--stiffness"},
+                               Misuse{"--stiffness -1", "-1"},
+                               Misuse{"--stiffness nan", "nan"},
+                               Misuse{"--young inf", "inf"},
+                               Misuse{"--poisson 0.5", "oisson"},
+                               Misuse{"--young 1e5 --stiffness 1", "excludes"},
+                               Misuse{"--damping -1", "--damping"},
+                               Misuse{"--drag nan", "nan"},
+                               Misuse{"--substeps -1", "--substeps"},
+                               Misuse{"--spheres -1", "--spheres"},
+                               Misuse{"--spheres 1e9", "--spheres"},
+                               Misuse{"--seed -1", "--seed"},
+                               Misuse{"--seeds 0", "--seeds"},
+                               Misuse{"--cells 0", "--cells"},
+                               Misuse{"--cells 100000", "--cells"},
+                               Misuse{"--still -1", "--still"}}) {
     SCOPED_TRACE(misuse.arguments);
-    expect_refusal(run_demo(words("run drop --mesh torus --no-render " + std::string(misuse.arguments))), misuse.mentions);
+    expect_refusal(run_demo(words("run drop --mesh torus --no-render " + std::string(misuse.arguments))),
+                   misuse.mentions);
   }
   expect_refusal(run_demo(words("run beam --cells 17")), "multiple of 4");
 }
@@ -58,7 +76,8 @@ TEST(CommandLine, RefusesPlacesThatCannotBeWritten) {
 TEST(CommandLine, RefusesBrokenMeshes) {
   const TemporaryDirectory directory;
   const std::string header = "# vtk DataFile Version 3.0\nbroken\nASCII\nDATASET UNSTRUCTURED_GRID\n",
-                    points = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n", one_cell = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+                    points = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n",
+                    one_cell = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
   struct Broken {
     const char* name;
     std::string text, mentions;
@@ -78,13 +97,15 @@ TEST(CommandLine, RefusesBrokenMeshes) {
     expect_refusal(outcome, broken.mentions);
   }
   expect_refusal(run_demo({"run", "drop", "--no-render", "--mesh", directory.path().string()}), "directory");
-  expect_refusal(run_demo({"run", "drop", "--no-render", "--mesh", (directory / "missing.vtk").string()}), "missing.vtk");
+  expect_refusal(run_demo({"run", "drop", "--no-render", "--mesh", (directory / "missing.vtk").string()}),
+                 "missing.vtk");
 }
 
 TEST(CommandLine, TakesAMeshOfOneTetrahedron) {
   const TemporaryDirectory directory;
-  std::ofstream(directory / "one.vtk") << "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\n"
-                                          "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+  std::ofstream(directory / "one.vtk")
+      << "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+         "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
   const Outcome outcome = run_demo({"run", "drop", "--duration", "1", "--stiffness", "10", "--mesh",
                                     (directory / "one.vtk").string(), "--summary", "-"});
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
@@ -103,14 +124,16 @@ TEST(CommandLine, ListsTheScenes) {
 TEST(CommandLine, ExplainsItself) {
   const Outcome outcome = run_demo({"run", "--help"});
   EXPECT_EQ(outcome.status, 0);
-  for (const char* option : {"--world", "--integrator", "--mesh", "--stiffness", "--young", "--poisson", "--start", "--seed",
-                             "--seeds", "--rate", "--duration", "--out", "--quality", "--gl", "--no-render", "--summary"})
+  for (const char* option :
+       {"--world", "--integrator", "--mesh", "--stiffness", "--young", "--poisson", "--start", "--seed", "--seeds",
+        "--rate", "--duration", "--out", "--quality", "--gl", "--no-render", "--summary"})
     EXPECT_NE(outcome.output.find(option), std::string::npos) << option;
 }
 
 TEST(CommandLine, ARunThatIsNotFiniteEndsWithStatus3AndItsSummary) {
   // 1e300 J a constraint overflow the forces of a stretched body.
-  const Outcome outcome = run_demo(words("run flight --mesh box --cells 2 --stiffness 1e300 --duration 0.1 --summary -"));
+  const Outcome outcome =
+      run_demo(words("run flight --mesh box --cells 2 --stiffness 1e300 --duration 0.1 --summary -"));
   EXPECT_EQ(outcome.status, 3);
   EXPECT_EQ(std::count(outcome.errors.begin(), outcome.errors.end(), '\n'), 1) << outcome.errors;
   EXPECT_NE(outcome.errors.find("step 1 "), std::string::npos) << outcome.errors;

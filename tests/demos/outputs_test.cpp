@@ -45,7 +45,8 @@ TEST(Summary, HasThePromisedKeys) {
     EXPECT_TRUE(summary[key].is_number()) << key;
   for (const char* key : {"finite", "recovered"}) EXPECT_TRUE(summary[key].is_boolean()) << key;
   EXPECT_TRUE(summary["mesh"]["source"].is_string());
-  for (const char* key : {"vertices", "tetrahedra", "edges"}) EXPECT_TRUE(summary["mesh"][key].is_number_integer()) << key;
+  for (const char* key : {"vertices", "tetrahedra", "edges"})
+    EXPECT_TRUE(summary["mesh"][key].is_number_integer()) << key;
   for (const char* key : {"median", "max"}) EXPECT_GT(summary["ms_per_step"][key], 0) << key;
   for (const char* key : {"initial", "peak", "final"}) EXPECT_TRUE(summary["energy"][key].is_number()) << key;
   for (const char* error : {"length_error", "volume_error"})
@@ -64,11 +65,13 @@ TEST(Summary, HasThePromisedKeys) {
 
 TEST(Summary, NamesTheWorld) {
   for (const char* world : {"classic", "deformable"})
-    EXPECT_EQ(summary_of(std::string("run flight --mesh box --cells 2 --duration 0.1 --world ") + world)["world"], world);
+    EXPECT_EQ(summary_of(std::string("run flight --mesh box --cells 2 --duration 0.1 --world ") + world)["world"],
+              world);
 }
 
 TEST(Summary, CountsRecoveredRuns) {
-  const Json summary = summary_of("run flight --mesh box --cells 4 --stiffness 1 --start squash --duration 4 --seed 3 --seeds 3");
+  const Json summary =
+      summary_of("run flight --mesh box --cells 4 --stiffness 1 --start squash --duration 4 --seed 3 --seeds 3");
   EXPECT_EQ(summary["runs"], 3);
   EXPECT_EQ(summary["recovered_runs"], 3);
   EXPECT_EQ(summary["recovered"], true);
@@ -93,8 +96,8 @@ TEST(Summary, IsTheSameForTheSameSeed) {
 
 TEST(Outputs, DataNeedsNoOpenGL) {
   const TemporaryDirectory directory;
-  const Outcome outcome = run_demo({"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.5", "--no-render", "--out",
-                                    (directory / "new/place").string()});
+  const Outcome outcome = run_demo({"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.5",
+                                    "--no-render", "--out", (directory / "new/place").string()});
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
   std::set<std::string> files;
   for (const auto& entry : std::filesystem::directory_iterator(directory / "new/place"))
@@ -109,8 +112,8 @@ TEST(Outputs, DataNeedsNoOpenGL) {
 
 TEST(Outputs, PicturesShowTheScene) {
   const TemporaryDirectory directory;
-  const Outcome outcome = run_demo({"run", "drop", "--mesh", "ball", "--cells", "6", "--stiffness", "1", "--duration", "0.2",
-                                    "--out", directory.path().string()},
+  const Outcome outcome = run_demo({"run", "drop", "--mesh", "ball", "--cells", "6", "--stiffness", "1", "--duration",
+                                    "0.2", "--out", directory.path().string()},
                                    "LP_NUM_THREADS=1");
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
   const Picture still = read_png(directory / "drop.png");
@@ -131,9 +134,9 @@ TEST(Outputs, PicturesShowTheScene) {
 
 TEST(Outputs, WithoutFfmpegTheFramesAreKept) {
   const TemporaryDirectory directory;
-  const Outcome outcome = run_demo({"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.1", "--out",
-                                    directory.path().string()},
-                                   "PATH=/nonexistent LP_NUM_THREADS=1");
+  const Outcome outcome = run_demo(
+      {"run", "flight", "--mesh", "box", "--cells", "2", "--duration", "0.1", "--out", directory.path().string()},
+      "PATH=/nonexistent LP_NUM_THREADS=1");
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
   EXPECT_NE(outcome.errors.find("ffmpeg"), std::string::npos) << outcome.errors;
   int frames = 0;

@@ -85,8 +85,9 @@ TEST_P(Scenes, DropCarriesAnEmbeddedSurface) {
   ASSERT_TRUE(scene->report().finite);
   EXPECT_LT(deepest, margin);
   const Eigen::Matrix3Xd surface = scene->setup().body.drawn(scene->particles().positions.topRows<3>());
-  EXPECT_LT(surface.row(1).minCoeff(), 0.2);                                  // it has landed
-  EXPECT_LT(scene->particles().positions.row(1).minCoeff(), surface.row(1).minCoeff());  // the lattice reaches beyond it
+  EXPECT_LT(surface.row(1).minCoeff(), 0.2);  // it has landed
+  EXPECT_LT(scene->particles().positions.row(1).minCoeff(),
+            surface.row(1).minCoeff());  // the lattice reaches beyond it
 }
 
 TEST_P(Scenes, BeamHangsFromItsClampedFace) {
