@@ -224,8 +224,8 @@ TYPED_TEST(BatchOf, RefusedElementsNameKindElementAndValue) {
   expect_refusal<TypeParam>(outside, 1, "index 5 is outside the 5 particles");
   expect_refusal<TypeParam>(negative, 1, "index -7 is outside the 5 particles");
   expect_refusal<TypeParam>(twice, 1, "index 0 appears twice");
-  expect_refusal<TypeParam>(good, 0, "stiffness is 0.000000 J, must be positive and finite");
-  expect_refusal<TypeParam>(good, -2.5, "stiffness is -2.500000 J, must be positive and finite");
+  expect_refusal<TypeParam>(good, 0, "stiffness is 0 J, must be positive and finite");
+  expect_refusal<TypeParam>(good, -2.5, "stiffness is -2.5 J, must be positive and finite");
   expect_refusal<TypeParam>(good, std::nan(""), "stiffness is nan J, must be positive and finite");
   expect_refusal<TypeParam>(good, std::numeric_limits<Real>::infinity(),
                             "stiffness is inf J, must be positive and finite");

@@ -140,7 +140,7 @@ TEST(ElasticField, RefusesWhatItsMaterialRefuses) {
   const TetMesh mesh = cube(1);
   EXPECT_THROW(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.poisson = 0.2}), std::invalid_argument);
   EXPECT_EQ(complaint<std::invalid_argument>([&] { make_elastic_field(mesh.vertices, mesh.tetrahedra, -1.0); }),
-            "length 0: stiffness is -1.000000 J, must be positive and finite");
+            "length 0: stiffness is -1 J, must be positive and finite");
 }
 
 }  // namespace

@@ -228,12 +228,12 @@ TEST(PotentialField, RefusedElementsNameKindElementIndexAndValue) {
   EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 5}}, {1}),
             "tetrahedron volume 0: index 5 is outside the 5 particles");
   EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1, -3}),
-            "length 1: stiffness is -3.000000 J, must be positive and finite");
+            "length 1: stiffness is -3 J, must be positive and finite");
   EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}, {2, 3}}, {1, 1, std::nan("")}),
             "length 2: stiffness is nan J, must be positive and finite");
-  EXPECT_EQ(refusal<Length>({{0, 1}, {0, 4}}, {1, 1}), "length 1: length: rest length is 0.000000");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {0, 4}}, {1, 1}), "length 1: length: rest length is 0");
   EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 3}, {0, 1, 2, 4}}, {1, 1}),
-            "tetrahedron volume 1: tetrahedron volume: rest volume is 0.000000");
+            "tetrahedron volume 1: tetrahedron volume: rest volume is 0");
   EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1}), "length: 1 stiffnesses for 2 stencils");
 }
 

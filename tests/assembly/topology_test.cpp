@@ -70,7 +70,7 @@ TEST(Faces, EncloseTheVolumeOfTheTetrahedra) {
     const std::vector<Real> volumes = signed_volumes(mesh.vertices, mesh.tetrahedra);
     const Real volume = std::accumulate(volumes.begin(), volumes.end(), 0.0);
     ASSERT_GT(*std::min_element(volumes.begin(), volumes.end()), 0);
-    EXPECT_NEAR(enclosed, volume, 1e-14 * mesh.tetrahedra.size());
+    EXPECT_NEAR(enclosed, volume, 1e-14 * static_cast<double>(mesh.tetrahedra.size()));
   }
 }
 

@@ -52,7 +52,7 @@ TEST(Length, RefusesAZeroRestLengthByName) {
   EXPECT_EQ(complaint<std::invalid_argument>([] {
               Length::at_rest(segment({1, 2, 3}, {1, 2, 3}));
             }),
-            "length: rest length is 0.000000");
+            "length: rest length is 0");
 }
 
 }  // namespace

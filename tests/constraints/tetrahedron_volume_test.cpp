@@ -109,7 +109,7 @@ TEST(TetrahedronVolume, RefusesFlatRestShapesByName) {
   EXPECT_EQ(complaint<std::invalid_argument>([] {
               TetrahedronVolume::at_rest(corner({1, 1, 0}));
             }),
-            "tetrahedron volume: rest volume is 0.000000");
+            "tetrahedron volume: rest volume is 0");
 }
 
 }  // namespace

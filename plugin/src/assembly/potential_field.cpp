@@ -11,7 +11,7 @@ PotentialField::PotentialField(const Eigen::Matrix3Xd& rest_positions) : rest_(p
     for (int axis = 0; axis < 3; ++axis)
       if (!std::isfinite(rest_positions(axis, i)))
         throw std::invalid_argument("field: rest position " + std::to_string(i) + ": coordinate " + "xyz"[axis] + " is " +
-                                    std::to_string(rest_positions(axis, i)));
+                                    to_text(rest_positions(axis, i)));
 }
 
 Potential& PotentialField::add(std::unique_ptr<Potential> potential) {

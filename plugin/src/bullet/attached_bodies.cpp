@@ -6,6 +6,7 @@
 
 #include "attached_world.h"
 #include "convert.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 namespace {
@@ -25,7 +26,7 @@ void check_contact_points(const std::vector<ContactPoint>& points, int num_parti
              " nodes");
       sum += point.weights[i];
     }
-    if (!(std::abs(sum - 1) < 1e-6)) fail("weights sum to " + std::to_string(sum) + ", must sum to 1");
+    if (!(std::abs(sum - 1) < 1e-6)) fail("weights sum to " + to_text(sum) + ", must sum to 1");
   }
 }
 

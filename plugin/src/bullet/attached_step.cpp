@@ -200,7 +200,8 @@ void AttachedBodies::World::detect_contacts(AttachedBody& attached, Island& isla
         Contact contact;
         contact.point = point;
         contact.rigid_body = touch(*object, approached, island, duration, gravity_applied);
-        contact.anchor = nearest.point + margin * nearest.normal;
+        contact.radius = nearest.radius > 0 ? nearest.radius + margin : 0;
+        contact.anchor = nearest.point + (margin - contact.radius) * nearest.normal;
         contact.normal = nearest.normal;
         contact.friction = friction;
         stepped.contacts.push_back(contact);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "convert.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 namespace {
@@ -48,7 +49,7 @@ struct DeformablePenaltyForce::Attached {
 
 DeformablePenaltyForce::DeformablePenaltyForce(Real damping_time) : type_(next_force_type()), damping_time_(damping_time) {
   if (!(damping_time >= 0) || !std::isfinite(damping_time))
-    throw std::invalid_argument("force: damping_time is " + std::to_string(damping_time) +
+    throw std::invalid_argument("force: damping_time is " + to_text(damping_time) +
                                 ", must be zero or positive [s]");
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "convert.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 void check(const TetMesh& mesh, const SoftBodyOptions& options) {
   const auto require = [](bool ok, const char* name, Real value, const char* range) {
     if (!ok)
-      throw std::invalid_argument(std::string("soft body: ") + name + " is " + std::to_string(value) + ", must be " +
+      throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " +
                                   range);
   };
   require(options.mass > 0 && std::isfinite(options.mass), "mass", options.mass, "positive and finite [kg]");
@@ -41,7 +42,7 @@ std::vector<Real> node_masses(const TetMesh& mesh, const SoftBodyOptions& option
   for (std::size_t i = 0; i < masses.size(); ++i) {
     masses[i] *= options.mass / total;
     if (!(masses[i] > 0))
-      throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + std::to_string(masses[i]) +
+      throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + to_text(masses[i]) +
                                   " kg: no tetrahedron of the mesh holds it");
   }
   return masses;

@@ -24,7 +24,7 @@ SurfacePoint around_core(const Vector3& point, const Vector3& core, Real radius)
   const Vector3 offset = point - core;
   const Real distance = offset.norm();
   const Vector3 normal = distance > 0 ? Vector3(offset / distance) : Vector3(Vector3::UnitY());
-  return {core + radius * normal, normal, distance - radius};
+  return {core + radius * normal, normal, distance - radius, radius};
 }
 
 SurfacePoint box_surface_point(const btBoxShape& box, const Vector3& point) {

@@ -8,10 +8,12 @@ class btCollisionShape;
 
 namespace penalty {
 
-/// The nearest point of a surface. `distance` is negative inside; `normal` points outwards.
+/// The nearest point of a surface. `distance` is negative inside; `normal` points outwards. A positive `radius` says that the
+/// surface is round there: it keeps this distance from point - radius * normal.
 struct SurfacePoint {
   Vector3 point, normal;
   Real distance;
+  Real radius = 0;
 };
 
 /// Appends the nearest surface points of `shape` to `point`, in the frame of the shape and within `reach` [m], one for

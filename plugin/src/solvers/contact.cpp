@@ -42,9 +42,11 @@ Real solve_contacts(std::span<Contact> contacts, Particles& particles, std::span
                         particles.inverse_masses[contact.point.particles[k]];
     if (point_mobility <= 0) continue;
 
-    const Vector3 normal = body.rotation * contact.normal;
     const Vector3 arm = weighted_sum(contact.point, particles.positions) - body.position;
-    const Real gap = normal.dot(arm - body.rotation * contact.anchor);
+    const Vector3 offset = arm - body.rotation * contact.anchor;
+    Vector3 normal = body.rotation * contact.normal;
+    if (contact.radius > 0 && !offset.isZero(0)) normal = offset.normalized();
+    const Real gap = normal.dot(offset) - contact.radius;
     contact.depth = std::max(contact.depth, -gap);
     const Vector3 obstacle_velocity = body.velocity_at(arm);
     const Vector3 relative = weighted_sum(contact.point, particles.velocities) - obstacle_velocity;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "penalty/math/text.h"
 #include "penalty/solvers/stable_step.h"
 
 namespace penalty {
@@ -210,10 +211,28 @@ void undo(std::span<SteppedBody* const> bodies) {
   }
 }
 
-int first_bad_particle(const Particles& particles) {
+int first_not_finite(const Particles& particles) {
   for (int i = 0; i < particles.size(); ++i)
     if (!particles.positions.col(i).allFinite() || !particles.velocities.col(i).allFinite()) return i;
   return -1;
+}
+
+int fastest(const Particles& particles) {
+  Eigen::Index particle = -1;
+  if (particles.size() > 0) particles.velocities.cwiseAbs().colwise().maxCoeff().maxCoeff(&particle);
+  return static_cast<int>(particle);
+}
+
+// Names the particle to look at after a step that could not be made finite, in the state that it started from: one that is
+// not finite itself; if there is none in the island, the fastest of each body.
+void name_bad_particles(std::span<SteppedBody* const> bodies) {
+  bool named = false;
+  for (SteppedBody* body : bodies) {
+    body->report.first_bad_particle = first_not_finite(body->start);
+    named = named || body->report.first_bad_particle >= 0;
+  }
+  if (named) return;
+  for (SteppedBody* body : bodies) body->report.first_bad_particle = fastest(body->start);
 }
 
 }  // namespace
@@ -221,7 +240,7 @@ int first_bad_particle(const Particles& particles) {
 void StepOptions::check() const {
   const auto require = [](bool ok, const char* name, Real value, const char* range) {
     if (!ok)
-      throw std::invalid_argument(std::string("step: ") + name + " is " + std::to_string(value) + ", must be " + range);
+      throw std::invalid_argument(std::string("step: ") + name + " is " + to_text(value) + ", must be " + range);
   };
   require(damping_time >= 0 && std::isfinite(damping_time), "damping_time", damping_time, "zero or positive [s]");
   require(drag >= 0 && std::isfinite(drag), "drag", drag, "zero or positive [1/s]");
@@ -244,7 +263,8 @@ void estimate_stability(SteppedBody& body, const Positions& rest_positions) {
 
 void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration) {
   if (bodies.empty() || !(duration > 0)) return;
-  const std::vector<RigidBody> rigid_start(rigid_bodies.begin(), rigid_bodies.end());
+  std::vector<RigidBody>& rigid_start = bodies.front()->rigid_start;
+  rigid_start.assign(rigid_bodies.begin(), rigid_bodies.end());
   Real noise = 0, tolerance = std::numeric_limits<Real>::infinity();
   int max_substeps = 1;
   for (SteppedBody* body : bodies) {
@@ -274,7 +294,7 @@ void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bo
     const Real scale = std::max(start_energy, end_energy);
     if (finite && !(growth > tolerance * scale + noise + contact_noise / attempt.substeps())) break;
     if (finite && growth > unresponsive * last_growth && growth < doubtful_growth * scale) break;
-    if (attempt.substeps() >= max_substeps) break;
+    if (attempt.substeps() >= max_substeps || !std::isfinite(start_energy)) break;
     last_growth = finite ? growth : std::numeric_limits<Real>::infinity();
     substeps = std::min(static_cast<int>(retry_growth * attempt.substeps()) + 1, max_substeps);
     undo(bodies);
@@ -286,13 +306,14 @@ void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bo
     report.substeps = attempt.substeps();
     report.retries = retries;
     report.finite = finite;
-    report.first_bad_particle = finite ? -1 : first_bad_particle(body->particles);
     body->last_substeps = attempt.substeps();
     for (const Contact& contact : body->contacts) report.contact_depth = std::max(report.contact_depth, contact.depth);
   }
   if (!finite) {
+    name_bad_particles(bodies);
     undo(bodies);
     std::copy(rigid_start.begin(), rigid_start.end(), rigid_bodies.begin());
+    energy(bodies, rigid_bodies);
     return;
   }
   for (SteppedBody* body : bodies)

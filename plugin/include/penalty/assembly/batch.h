@@ -30,6 +30,9 @@ class Batch final : public Potential {
     stiffnesses_.push_back(stiffness);
   }
 
+  /// Throws what `add` would throw.
+  void check(const Stencil& stencil, Real stiffness) const;
+
   void reserve(std::size_t size) {
     stencils_.reserve(size);
     kinds_.reserve(size);
@@ -56,8 +59,6 @@ class Batch final : public Potential {
   void append_values(const Positions& x, std::vector<Real>& values) const override;
 
  private:
-  void check(const Stencil& stencil, Real stiffness) const;
-
   static Points<num_points> gather(const Stencil& stencil, const Positions& x) {
     return penalty::gather<num_points>(stencil, x.data());
   }
@@ -83,7 +84,7 @@ void Batch<Kind>::check(const Stencil& stencil, Real stiffness) const {
       if (stencil[k] == stencil[l]) fail("index " + std::to_string(stencil[k]) + " appears twice");
   }
   if (!(stiffness > 0) || !std::isfinite(stiffness))
-    fail("stiffness is " + std::to_string(stiffness) + " J, must be positive and finite");
+    fail("stiffness is " + to_text(stiffness) + " J, must be positive and finite");
 }
 
 template <Constraint Kind>

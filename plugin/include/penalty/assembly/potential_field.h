@@ -82,14 +82,11 @@ Batch<Kind>& PotentialField::add(std::span<const std::array<int, Kind::num_point
   auto batch = std::make_unique<Batch<Kind>>(num_particles());
   batch->reserve(stencils.size());
   for (std::size_t e = 0; e < stencils.size(); ++e) {
-    Points<Kind::num_points> points = Points<Kind::num_points>::Zero();
-    bool inside = true;  // an index outside is left to the batch, which names it
-    for (int k = 0; k < Kind::num_points; ++k) {
-      inside = inside && stencils[e][k] >= 0 && stencils[e][k] < num_particles();
-      if (inside) points.col(k) = rest_.col(stencils[e][k]).template head<3>();
-    }
+    Points<Kind::num_points> points;
     try {
-      batch->add(stencils[e], inside ? Kind::at_rest(points) : Kind{}, stiffnesses[e]);
+      batch->check(stencils[e], stiffnesses[e]);
+      for (int k = 0; k < Kind::num_points; ++k) points.col(k) = rest_.col(stencils[e][k]).template head<3>();
+      batch->add(stencils[e], Kind::at_rest(points), stiffnesses[e]);
     } catch (const std::invalid_argument& error) {
       const std::string prefix = std::string(Kind::name) + " " + std::to_string(e) + ": ";
       const std::string what = error.what();

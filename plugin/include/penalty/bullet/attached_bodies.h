@@ -13,7 +13,7 @@ namespace penalty {
 struct AttachOptions {
   StepOptions step;
   /// Where the body may touch rigid bodies; empty: every node. Weighted points follow an embedded surface.
-  std::vector<ContactPoint> contact_points;
+  std::vector<ContactPoint> contact_points = {};
 };
 
 /// What both solvers of the plugin offer: soft bodies, each with a potential field, stepped inside the world step.

@@ -18,7 +18,8 @@ namespace penalty {
 /// (`setImplicit(true)`, which also wants `setUseProjection(true)` and a registered gravity force) the stiffness is
 /// Gauss-Newton's. Contact of a stiff body stays as unstable as under Bullet's own forces, and momentum is not
 /// exchanged exactly with rigid bodies: PenaltyDeformableBodySolver has neither limit. Every object has a force type of
-/// its own, so Bullet never merges two of them. The force outlives the world, which does not own it.
+/// its own, so Bullet never merges two of them. The world does not own the force: remove the
+/// bodies from the world before the force goes.
 class DeformablePenaltyForce final : public btDeformableLagrangianForce {
  public:
   /// `damping_time`: ratio of damping to stiffness along the constraint gradients [s]. Throws std::invalid_argument if it is

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "penalty/math/types.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 
@@ -47,7 +47,7 @@ Real value_and_gradient(const Kind& kind, const Points<Kind::num_points>& points
 /// Throws std::invalid_argument "<kind>: <what> is <value>" unless |value| > 0 and finite: a rest value that C is divided by.
 inline void require_rest_value(std::string_view kind, std::string_view what, Real value) {
   if (!(value < 0 || value > 0) || value - value != 0)
-    throw std::invalid_argument(std::string(kind) + ": " + std::string(what) + " is " + std::to_string(value));
+    throw std::invalid_argument(std::string(kind) + ": " + std::string(what) + " is " + to_text(value));
 }
 
 }  // namespace penalty

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "penalty/math/types.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 
@@ -27,7 +27,7 @@ struct Material {
   void check() const {
     const auto require = [](bool ok, const char* name, Real value, const char* range) {
       if (!ok)
-        throw std::invalid_argument(std::string("material: ") + name + " is " + std::to_string(value) + ", must be " + range);
+        throw std::invalid_argument(std::string("material: ") + name + " is " + to_text(value) + ", must be " + range);
     };
     require(young > 0 && young < 1e300, "Young's modulus", young, "positive and finite [Pa]");
     require(poisson >= 0.25 && poisson < 0.5, "Poisson's ratio", poisson, "in [0.25, 0.5) for springs and volumes");

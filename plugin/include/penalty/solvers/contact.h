@@ -17,12 +17,14 @@ struct ContactPoint {
   static ContactPoint at_particle(int particle) { return {{particle}, {1}, 1}; }
 };
 
-/// The point may not go below the plane through `anchor` with outward unit normal `normal`, both fixed in the rigid body.
+/// The point may not go below the plane through `anchor` with outward unit normal `normal`, both fixed in the rigid body; or,
+/// with a positive `radius`, not closer to `anchor` than that: the surface of a ball.
 struct Contact {
   ContactPoint point;
   int rigid_body = 0;          // index into the rigid bodies of the island
   Vector3 anchor, normal;      // in the frame of the rigid body [m], [-]
   Real friction = 0;           // Coulomb coefficient
+  Real radius = 0;             // of a ball about the anchor; zero: a plane [m]
   Real depth = 0;              // largest depth below the plane during the step [m], reported
 };
 

@@ -8,7 +8,8 @@
 
 namespace penalty {
 
-/// How a body is stepped. The defaults keep energy; `damping_time` and `drag` take it away.
+/// How a body is stepped. Nothing damps by default; `damping_time` and `drag` do. (Far from rest the energy guard still takes
+/// a little: it repeats steps that gain energy, not those that lose it.)
 struct StepOptions {
   Real damping_time = 0;         // ratio of damping to stiffness along the constraint gradients, beta [s]
   Real drag = 0;                 // rate at which all velocities decay [1/s]; does not keep momentum
@@ -28,7 +29,7 @@ struct StepReport {
   int substeps = 0;               // of the step that was kept
   int retries = 0;                // by the energy guard
   bool finite = true;             // false: the step was undone, the state is that of its start
-  int first_bad_particle = -1;    // when not finite
+  int first_bad_particle = -1;    // when not finite: the first such particle at the start, else the fastest
   Real elastic_energy = 0;        // at the end [J]
   Real kinetic_energy = 0;        // at the end, without rigid bodies [J]
   Real contact_depth = 0;         // largest depth below a contact plane [m]
@@ -58,6 +59,7 @@ struct SteppedBody {
   Real mass = 0;               // of the particles that are not pinned [kg]
   Real energy_noise = 0;       // growth of energy that means nothing [J]
   Particles start;             // positions and velocities to go back to
+  std::vector<RigidBody> rigid_start;  // likewise for the rigid bodies of its island
 };
 
 /// Sets `largest_eigenvalue` from the stiffness at the rest positions. Call once, and after a change of masses, stiffness or
@@ -74,7 +76,8 @@ void estimate_stability(SteppedBody& body, const Positions& rest_positions);
 /// of gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
 /// many substeps again; the next step starts from at least 0.8 of that number.
 ///
-/// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off. A step that cannot be made
+/// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off, but for the gyroscopic term
+/// of a rigid body with unequal moments of inertia, which is left to Bullet. A step that cannot be made
 /// finite is undone and reported, never handed on.
 void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration);
 
