@@ -1,5 +1,4 @@
-// The list of kinds. A new kind is its header and one line here: the library compiles its batch once and the property
-// tests run over it.
+// The list of kinds. A new kind is its header and one line here: the property tests run over it.
 #pragma once
 #include "penalty/constraints/length.h"
 #include "penalty/constraints/tetrahedron_volume.h"
