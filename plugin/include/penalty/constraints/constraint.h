@@ -11,7 +11,8 @@ namespace penalty {
 
 /// A scalar C(p_0 .. p_{n-1}) that is zero at rest: dimensionless for lengths, areas and volumes, in radians for angles,
 /// so that its stiffness K is an energy in joules for every kind. A kind is a small value type; it never sees K, an
-/// index or a mass. `at_rest(points)` makes one that is zero at the given points.
+/// index or a mass. `at_rest(points)` makes one that is zero at the given points: a static function, or, for a kind with
+/// parameters, a member of a prototype that holds them. `num_points` is `dynamic` for a kind of any number of points.
 template <class Kind>
 concept Constraint = requires(const Kind c, const Points<Kind::num_points>& p) {
   { Kind::name } -> std::convertible_to<std::string_view>;
@@ -31,6 +32,16 @@ concept HasValueAndGradient =
     Constraint<Kind> && requires(const Kind c, const Points<Kind::num_points>& p, Gradient<Kind::num_points>& g) {
       { c.value_and_gradient(p, g) } -> std::same_as<Real>;
     };
+
+/// A kind that is an energy itself, not the square of a constraint: E = K psi(p) with psi dimensionless, zero at rest and
+/// nowhere less, and K in joules as for constraints. `energy_and_gradient` overwrites its second argument with dpsi/dp.
+template <class Kind>
+concept ElasticEnergy = requires(const Kind e, const Points<Kind::num_points>& p, Gradient<Kind::num_points>& g) {
+  { Kind::name } -> std::convertible_to<std::string_view>;
+  { e.energy(p) } -> std::same_as<Real>;
+  { e.energy_and_gradient(p, g) } -> std::same_as<Real>;
+  { e.energy_hessian(p) } -> std::convertible_to<Hessian<Kind::num_points>>;
+};
 
 /// C and dC/dp at once; `gradient` is overwritten.
 template <Constraint Kind>

@@ -9,12 +9,16 @@ using Real = double;  // the mathematics is double; btScalar stays in bullet/
 using Vector3 = Eigen::Matrix<Real, 3, 1>;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 
+inline constexpr int dynamic = Eigen::Dynamic;  // a number of points that is known at run time only
+
 template <int N>
 using Points = Eigen::Matrix<Real, 3, N>;  // column i = p_i [m]
 template <int N>
 using Gradient = Eigen::Matrix<Real, 3, N>;  // column i = dC/dp_i
 template <int N>
-using Hessian = Eigen::Matrix<Real, 3 * N, 3 * N>;  // block (i, j) = d²C / dp_i dp_j
+inline constexpr int num_coordinates = N == dynamic ? dynamic : 3 * N;
+template <int N>
+using Hessian = Eigen::Matrix<Real, num_coordinates<N>, num_coordinates<N>>;  // block (i, j) = d²C / dp_i dp_j
 
 /// One vector a particle, padded to four reals (the last is zero) so that a particle is one aligned load; column i
 /// belongs to particle i.
