@@ -1,5 +1,7 @@
 #include "penalty/math/psd_projection.h"
 
+#include <Eigen/Eigenvalues>
+
 #include "math/random.h"
 
 namespace penalty::testing {
