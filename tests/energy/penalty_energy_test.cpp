@@ -55,6 +55,7 @@ TYPED_TEST(PenaltyEnergy, ForceIsMinusItsDerivative) {
 }
 
 TYPED_TEST(PenaltyEnergy, ForceHasNoNetForceAndNoNetTorque) {
+  if constexpr (!conserves_momentum<TypeParam>) GTEST_SKIP() << TypeParam::name << " acts from outside, see its header";
   WorstError net, torque;
   for (unsigned seed = 0; seed < num_samples; ++seed) {
     const auto s = sample<TypeParam>(seed);
