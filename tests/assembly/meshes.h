@@ -1,5 +1,6 @@
 // Small meshes and deformed states of them.
 #pragma once
+#include <Eigen/Eigenvalues>
 #include <vector>
 
 #include "math/random.h"

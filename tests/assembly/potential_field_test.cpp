@@ -48,7 +48,7 @@ TEST(PotentialField, IsTheSumOfItsBatches) {
     batch->add_stiffness_diagonal(b.x, 3, diagonal);
     batch->add_stiffness_bounds(b.x, bounds);
     batch->dissipate(b.x, inverse_masses, 0.1, 0.1, dissipated);
-    batch->append_values(b.x, values);
+    batch->append_strains(b.x, values);
     elements += batch->num_elements();
     k += assembled(*batch, b.x, StiffnessModel::exact).to_dense();
   }
@@ -62,7 +62,7 @@ TEST(PotentialField, IsTheSumOfItsBatches) {
   b.field.add_stiffness_diagonal(b.x, 3, sum_diagonal);
   b.field.add_stiffness_bounds(b.x, sum_bounds);
   b.field.dissipate(b.x, inverse_masses, 0.1, 0.1, sum_dissipated);
-  b.field.append_values(b.x, sum_values);
+  b.field.append_strains(b.x, sum_values);
   for (const PackedVectors* value : {&f, &damping, &product, &diagonal}) ASSERT_GT(value->norm(), 0);
   EXPECT_EQ(sum_f, f);
   EXPECT_EQ(sum_damping, damping);

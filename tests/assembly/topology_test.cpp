@@ -124,5 +124,76 @@ TEST(Volumes, OfTheTetrahedraAroundAnEdgeGiveItASixthEach) {
   EXPECT_EQ(shares, (std::vector<Real>{1, 1, 1, 3, 3, 2, 3, 2, 2}));
 }
 
+TEST(Hinges, HaveTheirLeftTriangleFirst) {
+  //   3---2
+  //   | / |
+  //   0---1
+  const std::vector<Triangle> square{{0, 1, 2}, {0, 2, 3}};
+  EXPECT_EQ(hinges_of(square), (std::vector<Hinge>{{0, 2, 3, 1}}));
+  const std::vector<Triangle> turned{{0, 2, 1}, {3, 2, 0}};
+  EXPECT_EQ(hinges_of(turned), (std::vector<Hinge>{{0, 2, 1, 3}})) << "the other side up";
+  EXPECT_TRUE(hinges_of(std::vector<Triangle>{{0, 1, 2}}).empty());
+}
+
+TEST(Hinges, AreTheInnerEdgesOfASurfaceEachOnceAndInOrder) {
+  for (const auto& [mesh, euler] : meshes()) {
+    SCOPED_TRACE(mesh.source);
+    std::vector<Triangle> surface = boundary_faces(mesh.tetrahedra);
+    const std::set<Triangle> triangles = [&] {
+      std::set<Triangle> rotations;
+      for (const auto& [a, b, c] : surface) rotations.insert({{a, b, c}, {b, c, a}, {c, a, b}});
+      return rotations;
+    }();
+    const auto edges_of_hinges = [](const std::vector<Hinge>& hinges) {
+      std::vector<Edge> edges;
+      for (const auto& [p0, p1, p2, p3] : hinges) edges.push_back({p0, p1});
+      return edges;
+    };
+    const std::vector<Hinge> hinges = hinges_of(surface);
+    EXPECT_EQ(edges_of_hinges(hinges), edges_of(surface)) << "closed: every edge is an inner one";
+    for (const auto& [p0, p1, p2, p3] : hinges) {
+      EXPECT_TRUE(triangles.contains({p0, p1, p2}));
+      EXPECT_TRUE(triangles.contains({p1, p0, p3}));
+    }
+    std::reverse(surface.begin(), surface.end());
+    EXPECT_EQ(hinges_of(surface), hinges) << "whatever the order of the triangles";
+    surface.pop_back();
+    EXPECT_EQ(hinges_of(surface).size(), hinges.size() - 3) << "a hole has a rim";
+  }
+}
+
+TEST(Hinges, NameTheEdgeThatHasNoLeftAndRight) {
+  const auto complaint = [](const std::vector<Triangle>& triangles) {
+    try {
+      hinges_of(triangles);
+    } catch (const std::invalid_argument& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(complaint({{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}), "hinges: edge 0, 1 belongs to 3 triangles");
+  EXPECT_EQ(complaint({{0, 1, 2}, {0, 1, 3}}),
+            "hinges: edge 0, 1 is run through in one direction by both of its triangles");
+}
+
+TEST(Areas, AreSharedOutToTheEdgesWithoutRest) {
+  Eigen::Matrix3Xd vertices(3, 4);
+  vertices << 0, 2, 2, 0, 0, 0, 1, 1, 3, 3, 3, 3;
+  const std::vector<Triangle> rectangle{{0, 1, 2}, {0, 2, 3}};
+  const std::vector<Real> areas = areas_of(vertices, rectangle);
+  EXPECT_EQ(areas, (std::vector<Real>{1, 1}));
+  const std::vector<Edge> edges = edges_of(rectangle);
+  //                                                             01 02 03 12 23
+  EXPECT_EQ(edge_area_shares(edges, rectangle, std::vector<Real>{3, 6}), (std::vector<Real>{1, 3, 2, 1, 2}));
+  for (const auto& [mesh, euler] : meshes()) {
+    const std::vector<Triangle> surface = boundary_faces(mesh.tetrahedra);
+    const std::vector<Real> all = areas_of(mesh.vertices, surface);
+    const std::vector<Real> shares = edge_area_shares(edges_of(surface), surface, all);
+    const Real area = std::accumulate(all.begin(), all.end(), 0.0);
+    EXPECT_NEAR(std::accumulate(shares.begin(), shares.end(), 0.0), area, 1e-13 * area);
+    EXPECT_GT(*std::min_element(shares.begin(), shares.end()), 0);
+  }
+}
+
 }  // namespace
 }  // namespace penalty::testing

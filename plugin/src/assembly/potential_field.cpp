@@ -1,5 +1,6 @@
 #include "penalty/assembly/potential_field.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -50,6 +51,11 @@ void PotentialField::append_pattern(std::vector<std::pair<int, int>>& pattern) c
   for (const auto& potential : potentials_) potential->append_pattern(pattern);
 }
 
+void PotentialField::append_rank_one_terms(const Positions& x, StiffnessModel model,
+                                           std::vector<RankOneTerm>& terms) const {
+  for (const auto& potential : potentials_) potential->append_rank_one_terms(x, model, terms);
+}
+
 void PotentialField::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
                                            Forces df) const {
   for (const auto& potential : potentials_) potential->add_stiffness_product(x, model, dx, scale, df);
@@ -68,8 +74,53 @@ void PotentialField::dissipate(const Positions& x, std::span<const Real> inverse
   for (const auto& potential : potentials_) potential->dissipate(x, inverse_masses, time, duration, v);
 }
 
-void PotentialField::append_values(const Positions& x, std::vector<Real>& values) const {
-  for (const auto& potential : potentials_) potential->append_values(x, values);
+bool PotentialField::damps() const {
+  return std::any_of(potentials_.begin(), potentials_.end(), [](const auto& p) { return p->damps(); });
+}
+
+bool PotentialField::evolves() const {
+  return std::any_of(potentials_.begin(), potentials_.end(), [](const auto& p) { return p->evolves(); });
+}
+
+Real PotentialField::evolve(const Positions& x, Real duration) {
+  Real taken = 0;
+  for (const auto& potential : potentials_) taken += potential->evolve(x, duration);
+  return taken;
+}
+
+void PotentialField::save_state() {
+  for (const auto& potential : potentials_) potential->save_state();
+}
+
+void PotentialField::restore_state() {
+  for (const auto& potential : potentials_) potential->restore_state();
+}
+
+std::uint64_t PotentialField::stiffness_version() const {
+  std::uint64_t sum = potentials_.size();
+  for (const auto& potential : potentials_) sum += potential->stiffness_version();
+  return sum;
+}
+
+void PotentialField::append_strains(const Positions& x, std::vector<Real>& strains) const {
+  for (const auto& potential : potentials_) potential->append_strains(x, strains);
+}
+
+void PotentialField::append_energies(const Positions& x, std::vector<Real>& energies) const {
+  for (const auto& potential : potentials_) potential->append_energies(x, energies);
+}
+
+void PotentialField::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
+  for (const auto& potential : potentials_) potential->append_ledger(x, ledger);
+}
+
+ElementBatch* PotentialField::find(std::string_view name) {
+  for (const auto& potential : potentials_) {
+    if (auto* batch = dynamic_cast<ElementBatch*>(potential.get()); batch && batch->name() == name) return batch;
+    if (auto* field = dynamic_cast<PotentialField*>(potential.get()))
+      if (auto* batch = field->find(name)) return batch;
+  }
+  return nullptr;
 }
 
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
@@ -81,21 +132,34 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
 }
 
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
-                                  const Material& material) {
-  material.check();
+                                  const Material& material, ElasticModel model) {
+  material.check(model);
   PotentialField field(vertices);
-  const std::vector<Edge> edges = edges_of(tetrahedra);
   std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
   for (Real& volume : volumes) volume = std::abs(volume);
-  std::vector<Real> stiffnesses = edge_volume_shares(edges, tetrahedra, volumes);
-  for (Real& k : stiffnesses) k *= material.length_stiffness_density();
-  field.add<Length>(edges, stiffnesses);
-  // Poisson ratio 1/4 computed in floating point may leave a volume term of either sign in the last digits.
-  const Real density = material.volume_stiffness_density();
-  if (density > 1e-12 * material.young) {
-    for (Real& volume : volumes) volume *= density;
-    field.add<TetrahedronVolume>(tetrahedra, volumes);
+  const auto scaled = [](std::vector<Real> shares, Real density) {
+    for (Real& share : shares) share *= density;
+    return shares;
+  };
+  if (model == ElasticModel::neo_hookean) {
+    field.add(StableNeoHookean::with_ratio(material.lame_lambda() / material.lame_mu()), tetrahedra,
+              scaled(volumes, material.lame_mu()));
+  } else {
+    const std::vector<Edge> edges = edges_of(tetrahedra);
+    field.add<Length>(edges, scaled(edge_volume_shares(edges, tetrahedra, volumes),
+                                    material.length_stiffness_density(model)));
+    if (material.area_stiffness_density(model) > 0) {
+      const std::vector<Triangle> faces = faces_of(tetrahedra);
+      field.add<TriangleArea>(faces, scaled(face_volume_shares(faces, tetrahedra, volumes),
+                                            material.area_stiffness_density(model)));
+    }
+    // The least Poisson ratio, computed in floating point, may leave a volume term of either sign in the last digits.
+    const Real density = material.volume_stiffness_density(model);
+    if (density > 1e-12 * material.young) field.add<TetrahedronVolume>(tetrahedra, scaled(volumes, density));
   }
+  if (material.damping > 0)
+    for (const auto& potential : field.potentials())
+      dynamic_cast<ElementBatch&>(*potential).set_damping_time(material.damping);
   return field;
 }
 

@@ -2,46 +2,53 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <vector>
 
-#include "penalty/constraints/constraint.h"
+#include "penalty/energy/penalty_energy.h"
 #include "penalty/math/triple.h"
 
 namespace penalty {
 
-template <int N>
-[[gnu::always_inline]] inline Points<N> gather(const std::array<int, N>& stencil, const Real* vectors) {
-  Points<N> points;
-  for (int k = 0; k < N; ++k) {
+/// `points` has the right number of columns already. `vectors` is packed, four reals a particle.
+template <class Stencil, class Columns>
+[[gnu::always_inline]] inline void gather_points(const Stencil& stencil, const Real* vectors, Columns& points) {
+  for (std::size_t k = 0; k < stencil.size(); ++k) {
     const Real* p = vectors + 4 * static_cast<std::size_t>(stencil[k]);
-    Triple{p[0], p[1], p[2]}.store(points, k);
+    Triple{p[0], p[1], p[2]}.store(points, static_cast<int>(k));
   }
-  return points;
 }
 
 /// vectors += scale * values, point by point.
-template <int N>
-[[gnu::always_inline]] inline void scatter(const std::array<int, N>& stencil, const Gradient<N>& values, Real scale,
-                                           Real* vectors) {
-  for (int k = 0; k < N; ++k) {
+template <class Stencil, class Columns>
+[[gnu::always_inline]] inline void scatter_points(const Stencil& stencil, const Columns& values, Real scale,
+                                                  Real* vectors) {
+  for (std::size_t k = 0; k < stencil.size(); ++k) {
     Real* p = vectors + 4 * static_cast<std::size_t>(stencil[k]);
-    for (int axis = 0; axis < 3; ++axis) p[axis] += scale * values(axis, k);
+    for (int axis = 0; axis < 3; ++axis) p[axis] += scale * values(axis, static_cast<Eigen::Index>(k));
   }
 }
 
-/// f += -K C dC for `size` elements; returns their energy. `x` and `f` are packed, four reals a particle.
-template <Constraint Kind>
-[[gnu::always_inline]] inline Real add_penalty_forces(const std::array<int, Kind::num_points>* stencils,
-                                                      const Kind* kinds, const Real* stiffnesses, std::size_t size,
-                                                      const Real* x, Real* f) {
-  Real twice_energy = 0;
+/// f += -dE/dp for `size` plain elements; returns their energy. `x` and `f` are packed, four reals a particle.
+template <ElementKind Kind>
+[[gnu::always_inline]] inline Real add_element_forces(
+    const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils, const Kind* kinds,
+    const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
+  Real sum = 0;
   for (std::size_t e = 0; e < size; ++e) {
+    Points<Kind::num_points> points;
     Gradient<Kind::num_points> gradient;
-    const Real c = value_and_gradient(kinds[e], gather<Kind::num_points>(stencils[e], x), gradient);
-    const Real kc = stiffnesses[e] * c;
-    twice_energy += kc * c;
-    scatter<Kind::num_points>(stencils[e], gradient, -kc, f);
+    gather_points(stencils[e], x, points);
+    if constexpr (Constraint<Kind>) {
+      const Real c = value_and_gradient(kinds[e], points, gradient);
+      const Real kc = stiffnesses[e] * c;
+      sum += kc * c;
+      scatter_points(stencils[e], gradient, -kc, f);
+    } else {
+      sum += stiffnesses[e] * kinds[e].energy_and_gradient(points, gradient);
+      scatter_points(stencils[e], gradient, -stiffnesses[e], f);
+    }
   }
-  return twice_energy / 2;
+  return Constraint<Kind> ? sum / 2 : sum;
 }
 
 }  // namespace penalty
