@@ -31,11 +31,12 @@ Real mobility(const RigidBody& body, const Vector3& arm, const Vector3& directio
 
 }  // namespace
 
-Real solve_contacts(std::span<Contact> contacts, Particles& particles, std::span<RigidBody> rigid_bodies, Real duration,
-                    Real slop) {
-  Real work = 0;
+ContactWork solve_contacts(std::span<Contact> contacts, Particles& particles, std::span<RigidBody> rigid_bodies,
+                           Real duration, Real slop) {
+  ContactWork work;
   for (Contact& contact : contacts) {
     RigidBody& body = rigid_bodies[contact.rigid_body];
+    contact.impulse.setZero();
     Real point_mobility = 0;
     for (int k = 0; k < contact.point.num_particles; ++k)
       point_mobility += contact.point.weights[k] * contact.point.weights[k] *
@@ -70,6 +71,11 @@ Real solve_contacts(std::span<Contact> contacts, Particles& particles, std::span
       impulse -= std::min(contact.friction * normal_impulse, stopping) * direction;
     }
 
+    contact.impulse = impulse;
+    const Vector3 point_velocity = relative + obstacle_velocity;
+    const Real on_particles = impulse.dot(point_velocity) + point_mobility / 2 * impulse.squaredNorm();
+    work.particles += on_particles;
+    work.loss += impulse.dot(obstacle_velocity) - mobility(body, arm, impulse) / 2 - on_particles;
     distribute(contact.point, particles.inverse_masses, impulse, particles.velocities);
     if (body.is_dynamic()) {
       const Vector3 moment = arm.cross(impulse);
@@ -78,7 +84,7 @@ Real solve_contacts(std::span<Contact> contacts, Particles& particles, std::span
       body.impulse -= impulse;
       body.angular_impulse -= moment;
     } else {
-      work += impulse.dot(obstacle_velocity);
+      work.obstacles += impulse.dot(obstacle_velocity);
     }
   }
   return work;

@@ -46,7 +46,7 @@ Real largest_eigenvalue_bound(const Potential& potential, const Positions& x, st
   const auto apply = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     in.topRows<3>() = (v.array() * scale).matrix().reshaped(3, num_particles);
     out.setZero();
-    potential.add_stiffness_product(x, StiffnessModel::gauss_newton, in, 1, out);
+    potential.add_stiffness_product(x, StiffnessModel::taut, in, 1, out);
     return (out.topRows<3>().reshaped().array() * scale).matrix();
   };
 

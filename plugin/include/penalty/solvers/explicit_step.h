@@ -36,17 +36,36 @@ struct StepReport {
   int num_contacts = 0;           // contacts that were considered
 };
 
+/// Energy that a body has received and lost [J]. Elastic and kinetic energy together are what they were at the start plus
+/// `received() - lost()`, but for the error of the integrator.
+struct EnergyFlows {
+  Real constant_forces = 0;  // work of gravity and external forces
+  Real contacts = 0;         // work of contacts on the body: rigid bodies give and take, impact and friction take
+  Real couplings = 0;        // work of couplings on the body
+  Real driving = 0;          // work of whoever moves pinned particles
+  Real changes = 0;          // between steps, by the application and by Bullet: positions, velocities, targets, elements
+  Real damping = 0;          // lost along the constraint gradients
+  Real drag = 0;             // lost to the drag of the step
+  Real inelastic = 0;        // lost to plastic flow and breaking
+  Real contact_loss = 0;     // lost to impact and friction where the body touches: already in `contacts`
+
+  Real received() const { return constant_forces + contacts + couplings + driving + changes; }
+  Real lost() const { return damping + drag + inelastic; }
+  EnergyFlows& operator+=(const EnergyFlows& other);
+};
+
 /// One body of an island: its state, its potential and what the integrator remembers of it between steps. The potential
 /// outlives the body.
 struct SteppedBody {
   Particles particles;
-  const Potential* potential = nullptr;
+  Potential* potential = nullptr;
   StepOptions options;
   Vector3 gravity = Vector3::Zero();  // [m/s²]
   PackedVectors external_forces;      // constant over the step [N]; empty: none
   Real largest_eigenvalue = 0;        // of M^-1 K at rest, an upper bound [1/s²]: see estimate_stability
   std::vector<Contact> contacts;      // of this step
   StepReport report;                  // of the last step
+  EnergyFlows flows;                  // of all steps
 
   /// Forgets what was computed at earlier positions: call after changing positions, external forces or the potential.
   void positions_changed() { forces_valid = false; }
@@ -55,12 +74,43 @@ struct SteppedBody {
   PackedVectors forces;  // at `particles.positions`, external ones included [N]
   Real elastic_energy = 0;
   bool forces_valid = false;
+  EnergyFlows step_flows;      // of the attempt at the present step
+  Real last_energy = 0;        // at the end of the last step [J]
+  bool stepped_before = false;
   int last_substeps = 0;       // what the energy guard settled on
   Real mass = 0;               // of the particles that are not pinned [kg]
   Real energy_noise = 0;       // growth of energy that means nothing [J]
   Particles start;             // positions and velocities to go back to
   std::vector<RigidBody> rigid_start;  // likewise for the rigid bodies of its island
 };
+
+/// A point that a coupling holds: a particle of a body of the island, or a point fixed in one of its rigid bodies.
+struct CoupledPoint {
+  int body = -1, particle = -1;     // index into the bodies of the island; -1: of a rigid body
+  int rigid_body = -1;              // index into the rigid bodies of the island
+  Vector3 anchor = Vector3::Zero(); // in the frame of the rigid body [m]
+};
+
+/// A potential over points of several bodies: attachments, joints of flesh and bone. Particle i of the potential is point i;
+/// no two points are the same particle. Rigid bodies get the reaction.
+struct Coupling {
+  std::vector<CoupledPoint> points;
+  Potential* potential = nullptr;
+  Real damping_time = 0;        // as in StepOptions [s]
+  Real largest_eigenvalue = 0;  // see estimate_stability [1/s²]
+  Real elastic_energy = 0;      // at the end of the last step [J]
+
+  // What the integrator works in.
+  bool has_driven_points = false;  // points of no mobility, which may be moved
+  PackedVectors positions, velocities, previous_velocities, forces;
+  std::vector<Real> inverse_masses;  // of a rigid body's point: no less than its mobility in any direction
+};
+
+/// Sets the inverse masses of the points and, if they changed or `anew`, `largest_eigenvalue` from the Gershgorin row sums of
+/// the stiffness at the rest positions of the potential's points: bodies turn against each other, and these do not depend
+/// on directions.
+void estimate_stability(Coupling& coupling, std::span<SteppedBody* const> bodies,
+                        std::span<const RigidBody> rigid_bodies, const Positions& rest_positions, bool anew);
 
 /// Sets `largest_eigenvalue` from the stiffness at the rest positions. Call once, and after a change of masses, stiffness or
 /// elements.
@@ -79,6 +129,9 @@ void estimate_stability(SteppedBody& body, const Positions& rest_positions);
 /// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off, but for the gyroscopic term
 /// of a rigid body with unequal moments of inertia, which is left to Bullet. A step that cannot be made
 /// finite is undone and reported, never handed on.
-void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration);
+///
+/// Plastic flow and breaking happen at the end of a block, up to eight times a step; what they take is no growth.
+void advance(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration,
+             std::span<Coupling* const> couplings = {});
 
 }  // namespace penalty
