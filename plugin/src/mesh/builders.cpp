@@ -3,29 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <unordered_map>
 
-#include "mesh_text.h"
+#include "builder_arguments.h"
+#include "icosphere.h"
 
 namespace penalty {
 namespace {
-
-void require_length(Real value, const std::string& name) {
-  if (!(value > 0) || value > largest_coordinate)
-    throw std::invalid_argument(name + " is " + to_text(value) + ", not a positive finite length");
-}
-
-void require_count(int value, int least, int most, const std::string& name) {
-  if (value < least || value > most)
-    throw std::invalid_argument(name + " is " + std::to_string(value) + ", not between " + std::to_string(least) +
-                                " and " + std::to_string(most));
-}
-
-std::string call(const std::string& name, std::initializer_list<std::string> arguments) {
-  std::string text = name + "(";
-  for (const std::string& argument : arguments) text += (text.back() == '(' ? "" : ", ") + argument;
-  return text + ")";
-}
 
 // The five tetrahedra of a cell. Corner b lies at (b & 1, b >> 1 & 1, b >> 2 & 1). The first is the regular one in the
 // middle, the others cut a corner off; `odd` is the mirror image of `even`.
@@ -38,74 +21,6 @@ std::string call(const std::string& name, std::initializer_list<std::string> arg
 //      0-------1
 constexpr Tetrahedron even[5] = {{0, 3, 6, 5}, {1, 0, 5, 3}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}};
 constexpr Tetrahedron odd[5] = {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}};
-
-// The faces of a regular icosahedron about the origin: corner indices, counter-clockwise seen from outside.
-struct Icosahedron {
-  std::array<Vector3, 12> corners;
-  std::vector<Triangle> faces;
-
-  Icosahedron() {
-    std::size_t count = 0;
-    for (Real one : {-1.0, 1.0})
-      for (Real golden : {-std::numbers::phi, std::numbers::phi})
-        for (const Vector3& corner : {Vector3(0, one, golden), Vector3(one, golden, 0), Vector3(golden, 0, one)})
-          corners[count++] = corner.normalized();
-    const auto joined = [this](int a, int b) { return corners[a].dot(corners[b]) > 0.4; };  // 1/sqrt(5) along an edge
-    for (int a = 0; a < 12; ++a)
-      for (int b = a + 1; b < 12; ++b)
-        for (int c = b + 1; c < 12; ++c)
-          if (joined(a, b) && joined(b, c) && joined(a, c)) {
-            const bool outward = corners[a].dot(corners[b].cross(corners[c])) > 0;
-            faces.push_back(outward ? Triangle{a, b, c} : Triangle{a, c, b});
-          }
-  }
-};
-
-// Vertices of the ball, each made once although up to five faces of the icosahedron share it: a vertex is known by the
-// corners it lies between and their weights.
-class BallVertices {
- public:
-  BallVertices(const Icosahedron& icosahedron, Real radius, int layers)
-      : icosahedron_(icosahedron), radius_(radius), layers_(layers) {}
-
-  // Weights are whole numbers; their sum is the layer.
-  int at(const Triangle& face, const std::array<int, 3>& weights) {
-    std::array<std::uint64_t, 3> parts;
-    for (int k = 0; k < 3; ++k)
-      parts[k] =
-          weights[k] == 0 ? 0 : static_cast<std::uint64_t>(face[k] + 1) << 8 | static_cast<std::uint64_t>(weights[k]);
-    std::sort(parts.begin(), parts.end());
-    const std::uint64_t key = parts[0] << 32 | parts[1] << 16 | parts[2];
-    const auto [entry, is_new] = index_.try_emplace(key, static_cast<int>(positions_.size()));
-    if (is_new) positions_.push_back(position(face, weights));
-    return entry->second;
-  }
-
-  const std::vector<Vector3>& positions() const { return positions_; }
-
- private:
-  // Sines instead of the weights themselves keep the spacing along the edges of the icosahedron even.
-  Vector3 position(const Triangle& face, const std::array<int, 3>& weights) const {
-    const int layer = weights[0] + weights[1] + weights[2];
-    if (layer == 0) return Vector3::Zero();
-    const Real edge_angle = std::atan(Real{2});
-    Vector3 direction = Vector3::Zero();
-    for (int k = 0; k < 3; ++k) direction += std::sin(edge_angle * weights[k] / layer) * icosahedron_.corners[face[k]];
-    return radius_ * layer / layers_ * direction.normalized();
-  }
-
-  const Icosahedron& icosahedron_;
-  Real radius_;
-  int layers_;
-  std::unordered_map<std::uint64_t, int> index_;
-  std::vector<Vector3> positions_;
-};
-
-Eigen::Matrix3Xd columns(const std::vector<Vector3>& positions) {
-  Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(positions.size()));
-  for (std::size_t i = 0; i < positions.size(); ++i) matrix.col(static_cast<Eigen::Index>(i)) = positions[i];
-  return matrix;
-}
 
 // The builders know the orientation of what they build up to sign: no repair is worth reporting.
 TetMesh finished(TetMesh mesh) {
@@ -217,7 +132,7 @@ TetMesh make_ball(Real radius, int layers) {
             }
             if (inside) mesh.tetrahedra.push_back(t);
           }
-  mesh.vertices = columns(vertices.positions());
+  mesh.vertices = vertices.columns();
   return finished(std::move(mesh));
 }
 

@@ -146,4 +146,10 @@ Real volume(const TriangleSurface& surface) {
   return six_volumes / 6;
 }
 
+Real area(const TriangleSurface& surface) {
+  Real sum = 0;
+  for (Real a : areas_of(surface.vertices, surface.triangles)) sum += a;
+  return sum;
+}
+
 }  // namespace penalty

@@ -1,4 +1,4 @@
-// Closed triangle surfaces: the skin of an embedded body.
+// Triangle surfaces: cloth and balloons, and the closed skin of an embedded body.
 #pragma once
 #include <string>
 #include <vector>
@@ -16,10 +16,11 @@ struct SurfaceRepair {
   bool flipped = false;       // the surface was inside-out
 };
 
+/// Open or closed; `repair`, `volume` and `embed` want it closed.
 struct TriangleSurface {
   Eigen::Matrix3Xd vertices;        // 3 x V [m]
   std::vector<Triangle> triangles;  // counter-clockwise seen from outside once repaired
-  std::string source;               // file name, for messages and summaries
+  std::string source;               // file name or builder call, for messages and summaries
   SurfaceRepair repairs;
 };
 
@@ -33,5 +34,8 @@ void repair(TriangleSurface& surface, Real merge_tolerance = 1e-7);
 
 /// The volume that a closed surface encloses [m^3], positive if it is oriented outwards.
 Real volume(const TriangleSurface& surface);
+
+/// Sum of the areas of the triangles [m^2].
+Real area(const TriangleSurface& surface);
 
 }  // namespace penalty
