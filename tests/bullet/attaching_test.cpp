@@ -173,7 +173,7 @@ TEST_P(Attaching, AClothOfLinksHangsByItsPinnedCorners) {
   EXPECT_LT(lowest(cloth), 1) << "hangs";
   EXPECT_GT(lowest(cloth), -0.5) << "but is not torn";
   std::vector<Real> strains;
-  sim.penalty().field(cloth).append_values(sim.penalty().particles(cloth).positions, strains);
+  sim.penalty().field(cloth).append_strains(sim.penalty().particles(cloth).positions, strains);
   EXPECT_LT(*std::max_element(strains.begin(), strains.end()), 0.3);
 }
 

@@ -24,7 +24,7 @@ class Reference : public WorldTest {
   }
 
   // The same state for the integrator alone.
-  SteppedBody copy_of(const btSoftBody& body, const PotentialField& field, const StepOptions& options) {
+  SteppedBody copy_of(const btSoftBody& body, PotentialField& field, const StepOptions& options) {
     SteppedBody copy;
     copy.particles = sim.penalty().particles(body);
     copy.potential = &field;
@@ -46,7 +46,7 @@ Real largest_difference(const PackedVectors& a, const PackedVectors& b) { return
 
 TEST_P(Reference, FreeFlightIsThatOfTheIntegratorAloneToTheLastBit) {
   btSoftBody& body = add_noisy_ball();
-  const PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
+  PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody copy = copy_of(body, field, {});
   SteppedBody* bodies[] = {&copy};
   const PackedVectors start = copy.particles.positions;
@@ -68,7 +68,7 @@ TEST_P(Reference, WithGravityDampingAndDragItIsTheSame) {
   sim.set_gravity({0.5, -9.75, 0.25});
   const StepOptions options{.damping_time = 0.001, .drag = 0.5};
   btSoftBody& body = add_noisy_ball({.step = options});
-  const PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
+  PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody copy = copy_of(body, field, options);
   SteppedBody* bodies[] = {&copy};
   for (int step = 0; step < 20; ++step) {
@@ -81,7 +81,7 @@ TEST_P(Reference, WithGravityDampingAndDragItIsTheSame) {
 
 TEST_P(Reference, AStepThatIsNotDyadicIsOnlyRounded) {
   btSoftBody& body = add_noisy_ball();
-  const PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
+  PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody rounded = copy_of(body, field, {}), exact = copy_of(body, field, {});
   SteppedBody *rounded_bodies[] = {&rounded}, *exact_bodies[] = {&exact};
   for (int step = 0; step < 20; ++step) {

@@ -1,6 +1,8 @@
 // Falling asleep and waking up. Only the deformable world lets soft bodies sleep.
 #include "bullet/simulation.h"
 
+#include <array>
+
 namespace penalty::testing {
 namespace {
 
@@ -76,6 +78,109 @@ TEST_P(Sleeping, ARigidBodyThatRestsOnItSleepsToo) {
   sim.step(frame, 120);
   EXPECT_NEAR(Real(box.getWorldTransform().getOrigin().y()), y, 1e-3) << "and neither sinks while asleep";
 }
+
+// Balls that hang one on the other, the first on the ground's far end: two ropes, added in either order.
+class SleepingTied : public WorldTest {
+ protected:
+  void tie(bool first_rope_first) {
+    sim.set_gravity({0, -9.81, 0});
+    sim.add_ground();
+    for (int k = 0; k < 3; ++k) {
+      bodies[k] = &sim.add_jelly(make_ball(0.3, 2), {.shift = {0.9 * k, 0.35, 0}, .attach = {.step = {.damping_time = 0.02}}});
+      let_sleep(*bodies[k]);
+    }
+    for (const int k : first_rope_first ? std::array{0, 1} : std::array{1, 0}) ropes[k] = couple(k, k + 1);
+  }
+
+  int couple(int a, int b) {
+    Eigen::Matrix3Xd rest(3, 2);
+    rest << to_vector(bodies[a]->m_nodes[0].m_x), to_vector(bodies[b]->m_nodes[0].m_x);
+    PotentialField rope(rest);
+    rope.add<Length>(std::vector<Edge>{{0, 1}}, 50).set_free_play(-infinite, 0);
+    return sim.penalty().couple({CouplingPoint::at_node(*bodies[a], 0), CouplingPoint::at_node(*bodies[b], 0)},
+                                std::move(rope), 0.01);
+  }
+
+  bool all_asleep() const {
+    return std::all_of(bodies.begin(), bodies.end(),
+                       [](const btSoftBody* body) { return body->getActivationState() == ISLAND_SLEEPING; });
+  }
+
+  bool fall_asleep() {
+    for (int step = 0; step < 3600 && !all_asleep(); ++step) sim.step(frame);
+    return all_asleep();
+  }
+
+  std::array<btSoftBody*, 3> bodies{};
+  std::array<int, 2> ropes{};
+};
+
+TEST_P(SleepingTied, TheyFallAsleepTogetherAndTheWholeChainWakesAtOneEnd) {
+  for (const bool first_rope_first : {true, false}) {
+    if (bodies[0])
+      for (btSoftBody*& body : bodies) sim.remove(*body);
+    tie(first_rope_first);
+    ASSERT_TRUE(fall_asleep());
+    bodies[2]->activate();
+    for (int i = 0; i < bodies[2]->m_nodes.size(); ++i) bodies[2]->m_nodes[i].m_v = btVector3(4, 0, 0);
+    const Real before = center_of_mass(sim.penalty().particles(*bodies[0])).x();
+    sim.step(frame, 60);
+    EXPECT_GT(center_of_mass(sim.penalty().particles(*bodies[0])).x(), before + 0.05) << "the last one was dragged along";
+  }
+}
+
+TEST_P(SleepingTied, ABallThatHitsOneWakesTheOther) {
+  tie(true);
+  ASSERT_TRUE(fall_asleep());
+  sim.add_box({0.1, 0.1, 0.1}, 1, {0.9, 1.5, 0});
+  bool woken = false;
+  for (int step = 0; step < 90; ++step) {
+    sim.step(frame);
+    woken = woken || (bodies[0]->isActive() && bodies[1]->isActive() && bodies[2]->isActive());
+  }
+  EXPECT_TRUE(woken);
+}
+
+TEST_P(SleepingTied, UncouplingWakesWhatHungOnIt) {
+  tie(true);
+  ASSERT_TRUE(fall_asleep());
+  sim.penalty().uncouple(ropes[1]);
+  EXPECT_TRUE(bodies[1]->isActive() && bodies[2]->isActive());
+  EXPECT_FALSE(bodies[0]->isActive());
+}
+
+TEST_P(SleepingTied, ABodyThatIsSwitchedOffIsNoError) {
+  tie(true);
+  bodies[1]->forceActivationState(DISABLE_SIMULATION);
+  EXPECT_NO_THROW(sim.step(frame, 30));
+}
+
+INSTANTIATE_TEST_SUITE_P(World, SleepingTied, deformable_world(), param_name);
+
+// A weight on a soft rope swings slowly enough for Bullet to think that it rests.
+class SlowPendulum : public WorldTest {};
+
+TEST_P(SlowPendulum, SwingsOn) {
+  sim.set_gravity({0, -9.81, 0});
+  btSoftBody& post = sim.add_jelly(make_box({0.2, 0.2, 0.2}, {1, 1, 1}), {.body = {.pinned = {0, 1, 2, 3, 4, 5, 6, 7}}});
+  btRigidBody& weight = sim.add_box({0.05, 0.05, 0.05}, 1, {0.15, -1.5, 0});
+  let_sleep(weight);
+  let_sleep(post);
+  const Vector3 top = to_vector(post.m_nodes[0].m_x);
+  Eigen::Matrix3Xd rest(3, 2);
+  rest << top, Vector3(0.15, -1.5, 0);
+  PotentialField rope(rest);
+  rope.add<Length>(std::vector<Edge>{{0, 1}}, 5000);
+  sim.penalty().couple({CouplingPoint::at_node(post, 0), CouplingPoint::on(weight, {0, 0, 0})}, std::move(rope));
+  Real late_swing = 0;
+  for (int step = 0; step < 720; ++step) {
+    sim.step(frame);
+    if (step > 480) late_swing = std::max(late_swing, std::abs(Real(weight.getWorldTransform().getOrigin().x()) - top.x()));
+  }
+  EXPECT_GT(late_swing, 0.6 * std::abs(0.15 - top.x())) << "after 8 s";
+}
+
+INSTANTIATE_TEST_SUITE_P(World, SlowPendulum, both_worlds(), param_name);
 
 INSTANTIATE_TEST_SUITE_P(World, Sleeping, deformable_world(), param_name);
 

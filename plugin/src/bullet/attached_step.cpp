@@ -110,11 +110,11 @@ RigidBody AttachedBodies::World::start_of(const btCollisionObject& object, Real 
   start.rotation = to_matrix(object.getWorldTransform().getBasis());
   const btRigidBody* body = btRigidBody::upcast(&object);
   if (!body || body->isStaticObject()) return start;
-  const bool dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
-  if (!dynamic && !body->isKinematicObject()) return start;
+  const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
+  if (!is_dynamic && !body->isKinematicObject()) return start;
   start.velocity = to_vector(body->getLinearVelocity());
   start.angular_velocity = to_vector(body->getAngularVelocity());
-  if (!dynamic) return start;
+  if (!is_dynamic) return start;
 
   start.inverse_mass = Real(body->getInvMass()) * to_vector(body->getLinearFactor());
   start.inverse_inertia = inverse_inertia(*body);
@@ -230,6 +230,94 @@ void AttachedBodies::World::wake_if_hit(btSoftBody& body) {
   }
 }
 
+// Coupled bodies sleep together or not at all: while one is restless, those that want to sleep stay awake, and keep the time
+// that they have been at rest, so that all fall asleep when the last of them may. Chains of couplings take several passes.
+void AttachedBodies::World::wake_coupled() {
+  const auto object_of = [this](const CouplingPoint& point) -> btCollisionObject& {
+    if (point.soft_body) return *get(*point.soft_body).body;
+    if (!point.rigid_body->getBroadphaseHandle())
+      throw std::logic_error("a coupled rigid body has left the world: uncouple it first");
+    return *point.rigid_body;
+  };
+  const auto can_sleep = [](const btCollisionObject& object) {
+    return !object.isStaticOrKinematicObject() && (object.getActivationState() == WANTS_DEACTIVATION ||
+                                                   object.getActivationState() == ISLAND_SLEEPING);
+  };
+  const auto is_restless = [&](const btCollisionObject& object) {
+    const btRigidBody* body = btRigidBody::upcast(&object);
+    if (body && body->isStaticOrKinematicObject())
+      return body->isKinematicObject() && !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
+    return object.isActive() && !can_sleep(object);
+  };
+  bool changed = true;
+  while (changed) {
+    changed = false;
+    for (const auto& coupling : couplings_) {
+      bool restless = false, active = false;
+      for (const CouplingPoint& point : coupling->points) {
+        const btCollisionObject& object = object_of(point);
+        restless = restless || is_restless(object);
+        active = active || (object.isActive() && !object.isStaticOrKinematicObject());
+      }
+      if (!restless && !active) continue;
+      for (const CouplingPoint& point : coupling->points) {
+        btCollisionObject& object = object_of(point);
+        const int wanted = restless ? ACTIVE_TAG : WANTS_DEACTIVATION;
+        if (!can_sleep(object) || object.getActivationState() == wanted) continue;
+        object.forceActivationState(wanted);
+        changed = true;
+      }
+    }
+  }
+}
+
+void AttachedBodies::World::absorb(Island& into, Island& from) {
+  std::vector<int> renumbered;
+  for (const TouchedRigidBody& touched : from.touched) {
+    const auto known = std::find_if(into.touched.begin(), into.touched.end(),
+                                    [&](const TouchedRigidBody& t) { return t.key == touched.key; });
+    renumbered.push_back(static_cast<int>(known - into.touched.begin()));
+    if (known == into.touched.end()) into.touched.push_back(touched);
+  }
+  for (SteppedBody* body : from.bodies) {
+    for (Contact& contact : body->contacts) contact.rigid_body = renumbered[contact.rigid_body];
+    into.bodies.push_back(body);
+  }
+  into.couplings.insert(into.couplings.end(), from.couplings.begin(), from.couplings.end());
+  from = {};
+}
+
+// Brings the bodies of each coupling that is awake into one island. A coupling to a soft body that the application has
+// switched off rests.
+void AttachedBodies::World::join_coupled(Real duration, bool gravity_applied) {
+  const auto island_of = [this](const SteppedBody& body) {
+    return std::find_if(islands_.begin(), islands_.end(), [&](const Island& island) {
+      return std::find(island.bodies.begin(), island.bodies.end(), &body) != island.bodies.end();
+    });
+  };
+  for (const auto& coupling : couplings_) {
+    const auto home = std::find_if(coupling->points.begin(), coupling->points.end(),
+                                   [](const CouplingPoint& point) { return point.soft_body; });
+    const auto island = island_of(get(*home->soft_body).stepped);
+    if (island == islands_.end()) continue;
+    const bool complete = std::all_of(coupling->points.begin(), coupling->points.end(), [&](const CouplingPoint& point) {
+      return !point.soft_body || get(*point.soft_body).body->isActive();
+    });
+    if (!complete) continue;
+    for (const CouplingPoint& point : coupling->points) {
+      if (point.rigid_body) {
+        touch(*point.rigid_body, false, *island, duration, gravity_applied);
+        continue;
+      }
+      const auto other = island_of(get(*point.soft_body).stepped);
+      if (other == islands_.end())
+        throw std::logic_error("a coupled soft body is not in the world of the others: uncouple it first");
+      if (other != island) absorb(*island, *other);
+    }
+    island->couplings.push_back(coupling.get());
+  }
+}
+
 // Bodies that touch the same movable rigid body are stepped together.
 void AttachedBodies::World::merge_islands() {
   const auto share = [](const Island& a, const Island& b) {
@@ -237,20 +325,6 @@ void AttachedBodies::World::merge_islands() {
       for (const TouchedRigidBody& second : b.touched)
         if (first.key == second.key && first.start.is_dynamic()) return true;
     return false;
-  };
-  const auto absorb = [](Island& into, Island& from) {
-    std::vector<int> renumbered;
-    for (const TouchedRigidBody& touched : from.touched) {
-      const auto known = std::find_if(into.touched.begin(), into.touched.end(),
-                                      [&](const TouchedRigidBody& t) { return t.key == touched.key; });
-      renumbered.push_back(static_cast<int>(known - into.touched.begin()));
-      if (known == into.touched.end()) into.touched.push_back(touched);
-    }
-    for (SteppedBody* body : from.bodies) {
-      for (Contact& contact : body->contacts) contact.rigid_body = renumbered[contact.rigid_body];
-      into.bodies.push_back(body);
-    }
-    from = {};
   };
   for (std::size_t i = 0; i < islands_.size(); ++i)
     for (std::size_t j = i + 1; j < islands_.size();)
@@ -260,6 +334,33 @@ void AttachedBodies::World::merge_islands() {
       } else {
         ++j;
       }
+}
+
+void AttachedBodies::World::advance_island(Island& island, Real duration) {
+  island.states.clear();
+  for (const TouchedRigidBody& touched : island.touched) island.states.push_back(touched.start);
+  std::vector<Coupling*> couplings;
+  for (AttachedCoupling* coupling : island.couplings) {
+    for (std::size_t k = 0; k < coupling->points.size(); ++k) {
+      const CouplingPoint& point = coupling->points[k];
+      CoupledPoint& coupled = coupling->stepped.points[k];
+      if (point.soft_body) {
+        const auto body = std::find(island.bodies.begin(), island.bodies.end(), &get(*point.soft_body).stepped);
+        coupled = {.body = static_cast<int>(body - island.bodies.begin()), .particle = point.node};
+      } else {
+        const auto touched = std::find_if(island.touched.begin(), island.touched.end(), [&](const TouchedRigidBody& t) {
+          return t.key == point.rigid_body->getBroadphaseHandle()->m_uniqueId;
+        });
+        coupled = {.rigid_body = static_cast<int>(touched - island.touched.begin()), .anchor = point.anchor};
+      }
+    }
+    const std::uint64_t version = coupling->field.stiffness_version();
+    estimate_stability(coupling->stepped, island.bodies, island.states, coupling->field.rest_positions(),
+                       version != coupling->estimated_version);
+    coupling->estimated_version = version;
+    couplings.push_back(&coupling->stepped);
+  }
+  advance(island.bodies, island.states, duration, couplings);
 }
 
 void AttachedBodies::World::hand_back(Island& island, Real duration, bool gravity_applied) {
@@ -284,19 +385,21 @@ std::span<AttachedBody* const> AttachedBodies::World::step(std::span<btSoftBody*
   std::erase_if(expectations_, [this](const auto& entry) { return entry.second.step < step_count_ - 1; });
   stepped_.clear();
   islands_.clear();
+  for (btSoftBody* body : bodies)
+    if (find(*body)) wake_if_hit(*body);
+  wake_coupled();
   for (btSoftBody* body : bodies) {
     AttachedBody* attached = find(*body);
-    if (!attached) continue;
-    wake_if_hit(*body);
-    if (!body->isActive()) continue;
+    if (!attached || !body->isActive()) continue;
     attached->read_nodes();
     attached->read_forces();
     SteppedBody& stepped = attached->stepped;
     const Vector3 gravity = to_vector(body->getWorldInfo()->m_gravity) * Real(body->m_gravityFactor);
     stepped.gravity = gravity;
-    if (attached->stale) {
+    if (attached->stale || attached->estimated_version != attached->field.stiffness_version()) {
       estimate_stability(stepped, attached->field.rest_positions());
       attached->stale = false;
+      attached->estimated_version = attached->field.stiffness_version();
     }
     Island island;
     island.bodies.push_back(&stepped);
@@ -308,12 +411,11 @@ std::span<AttachedBody* const> AttachedBodies::World::step(std::span<btSoftBody*
     islands_.push_back(std::move(island));
     stepped_.push_back(attached);
   }
+  join_coupled(duration, gravity_applied);
   merge_islands();
   std::erase_if(islands_, [](const Island& island) { return island.bodies.empty(); });
   for (Island& island : islands_) {
-    island.states.clear();
-    for (const TouchedRigidBody& touched : island.touched) island.states.push_back(touched.start);
-    advance(island.bodies, island.states, duration);
+    advance_island(island, duration);
     hand_back(island, duration, gravity_applied);
   }
   for (AttachedBody* attached : stepped_)
@@ -327,7 +429,7 @@ std::span<AttachedBody* const> AttachedBodies::World::step(std::span<btSoftBody*
 void AttachedBodies::World::correct_rigid_bodies(Real duration) {
   for (Island& island : islands_)
     for (TouchedRigidBody& touched : island.touched) {
-      if (!touched.start.is_dynamic()) continue;
+      if (!touched.start.is_dynamic() || !touched.body->isActive()) continue;  // who fell asleep was not moved
       const Vector3 shift = touched.state.position - touched.start.position - duration * touched.state.velocity;
       const Vector3 turn = touched.state.turn - duration * touched.state.angular_velocity;
       btTransform transform = touched.body->getWorldTransform();

@@ -21,6 +21,7 @@ struct AttachedBody {
   AttachOptions options;
   SteppedBody stepped;
   bool stale = true;  // the stability estimate is to be made anew
+  std::uint64_t estimated_version = 0;  // of the field's stiffness
 
   // What was last written to the nodes: only differences to it are read.
   btAlignedObjectArray<btVector3> written_positions, written_velocities;
@@ -42,12 +43,27 @@ struct TouchedRigidBody {
   RigidBody start, state;
 };
 
+/// A coupling and what it holds.
+struct AttachedCoupling {
+  int number;
+  std::vector<CouplingPoint> points;
+  PotentialField field;
+  Coupling stepped;
+  std::uint64_t estimated_version = 0;
+
+  bool holds(const btSoftBody& body) const;
+};
+
 class AttachedBodies::World {
  public:
   AttachedBody* find(const btSoftBody& body);
   AttachedBody& get(const btSoftBody& body);
   void attach(btSoftBody& body, PotentialField field, const AttachOptions& options);
   void detach(const btSoftBody& body);
+  int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time);
+  void uncouple(int number);
+  void wake(const AttachedCoupling& coupling);
+  AttachedCoupling& coupling(int number);
 
   /// Steps the attached and active ones of `bodies`, all soft bodies of the world, from what their nodes say, together with the
   /// rigid bodies that they touch, whose velocities change. `gravity_applied`: the world has already added gravity to the
@@ -63,6 +79,7 @@ class AttachedBodies::World {
     std::vector<SteppedBody*> bodies;
     std::vector<TouchedRigidBody> touched;
     std::vector<RigidBody> states;  // those of `touched`, in one array for the integrator
+    std::vector<AttachedCoupling*> couplings;
   };
 
   // What was expected of a rigid body after the last step: the difference is what other contacts did to it.
@@ -75,10 +92,16 @@ class AttachedBodies::World {
   RigidBody start_of(const btCollisionObject& object, Real duration, bool gravity_applied) const;
   int touch(btCollisionObject& object, bool approached, Island& island, Real duration, bool gravity_applied);
   void wake_if_hit(btSoftBody& body);
+  void wake_coupled();
+  void join_coupled(Real duration, bool gravity_applied);
+  void absorb(Island& into, Island& from);
   void merge_islands();
+  void advance_island(Island& island, Real duration);
   void hand_back(Island& island, Real duration, bool gravity_applied);
 
   std::unordered_map<const btSoftBody*, std::unique_ptr<AttachedBody>> bodies_;
+  std::vector<std::unique_ptr<AttachedCoupling>> couplings_;
+  int next_coupling_ = 0;
   std::vector<AttachedBody*> stepped_;
   std::vector<Island> islands_;
   std::unordered_map<int, Expectation> expectations_;

@@ -97,8 +97,8 @@ void DeformablePenaltyForce::addScaledExplicitForce(btScalar scale, TVStack& for
 }
 
 void DeformablePenaltyForce::addScaledDampingForce(btScalar scale, TVStack& force) {
-  if (damping_time_ == 0) return;
   for_each_active([&](Attached& a) {
+    if (damping_time_ == 0 && !a.field.damps()) return;
     a.read_velocities();
     a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
     a.add_to(force, scale);
@@ -114,14 +114,15 @@ void DeformablePenaltyForce::addScaledElasticForceDifferential(btScalar scale, c
 }
 
 void DeformablePenaltyForce::addScaledDampingForceDifferential(btScalar scale, const TVStack& dv, TVStack& df) {
-  if (damping_time_ == 0) return;
   for_each_active([&](Attached& a) {
+    if (damping_time_ == 0 && !a.field.damps()) return;
     a.read(dv);
     a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
     a.add_to(df, scale);
   });
 }
 
+// Of the damping time of the whole only: a preconditioner needs no more.
 void DeformablePenaltyForce::buildDampingForceDifferentialDiagonal(btScalar scale, TVStack& diagonal) {
   if (damping_time_ == 0) return;
   for_each_active([&](Attached& a) {
@@ -148,8 +149,8 @@ double DeformablePenaltyForce::totalElasticEnergy(btScalar) {
 // What damping takes in one step, -dt F_d . v, at the present velocities.
 double DeformablePenaltyForce::totalDampingEnergy(btScalar time_step) {
   double sum = 0;
-  if (damping_time_ == 0) return sum;
   for_each_active([&](Attached& a) {
+    if (damping_time_ == 0 && !a.field.damps()) return;
     a.read_velocities();
     a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
     sum -= Real(time_step) * a.out.cwiseProduct(a.in).sum();

@@ -6,6 +6,7 @@
 #include "penalty/assembly/potential_field.h"
 #include "penalty/solvers/explicit_step.h"
 
+class btRigidBody;
 class btSoftBody;
 
 namespace penalty {
@@ -14,6 +15,17 @@ struct AttachOptions {
   StepOptions step;
   /// Where the body may touch rigid bodies; empty: every node. Weighted points follow an embedded surface.
   std::vector<ContactPoint> contact_points = {};
+};
+
+/// A point that a coupling holds: a node of an attached soft body, or a point fixed in a rigid body.
+struct CouplingPoint {
+  const btSoftBody* soft_body = nullptr;
+  int node = -1;
+  btRigidBody* rigid_body = nullptr;
+  Vector3 anchor = Vector3::Zero();  // in the frame of the rigid body [m]
+
+  static CouplingPoint at_node(const btSoftBody& body, int node) { return {.soft_body = &body, .node = node}; }
+  static CouplingPoint on(btRigidBody& body, const Vector3& anchor) { return {.rigid_body = &body, .anchor = anchor}; }
 };
 
 /// What both solvers of the plugin offer: soft bodies, each with a potential field, stepped inside the world step.
@@ -43,6 +55,31 @@ class AttachedBodies {
   const Particles& particles(const btSoftBody& body) const;
   const PotentialField& field(const btSoftBody& body) const;
   const StepReport& report(const btSoftBody& body) const;
+
+  /// Energy that came and went since the body was attached [J].
+  const EnergyFlows& flows(const btSoftBody& body) const;
+
+  /// One entry a batch, at the present positions.
+  std::vector<LedgerEntry> ledger(const btSoftBody& body) const;
+
+  /// Elastic forces on the nodes at the present positions, those of couplings left out: column i on node i [N].
+  PackedVectors forces(const btSoftBody& body) const;
+
+  /// The field, for changes: targets, stiffnesses, elements switched off. Wakes the body; call it anew for each change. The
+  /// field is to be changed, not to be assigned to.
+  PotentialField& edit(const btSoftBody& body);
+
+  /// Adds a potential over points of several bodies of this solver: particle i of the field is points[i], its rest
+  /// positions those of the field. Rigid bodies get the reaction. Returns the number of the coupling. Throws
+  /// std::invalid_argument for a body that is not attached, a node outside it, a rigid body in no world, a point that
+  /// appears twice, no soft body at all, or another number of points than the field has particles.
+  int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time = 0);
+
+  /// Removes a coupling; call before one of its rigid bodies leaves the world. Detaching a soft body does it by itself.
+  void uncouple(int coupling);
+  const PotentialField& coupling_field(int coupling) const;
+  PotentialField& edit_coupling(int coupling);  // wakes its bodies
+  Real coupling_energy(int coupling) const;     // at the end of the last step [J]
 
   /// The substep count is estimated anew at the next step: call after a change of masses or of the field.
   void refresh(const btSoftBody& body);

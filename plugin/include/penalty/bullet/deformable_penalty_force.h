@@ -17,7 +17,7 @@ namespace penalty {
 /// The stock solver evaluates it once a step, so a stiff field needs a small time step in explicit mode; in implicit mode
 /// (`setImplicit(true)`, which also wants `setUseProjection(true)` and a registered gravity force) the stiffness is
 /// Gauss-Newton's. Contact of a stiff body stays as unstable as under Bullet's own forces, and momentum is not
-/// exchanged exactly with rigid bodies: PenaltyDeformableBodySolver has neither limit. Every object has a force type of
+/// exchanged exactly with rigid bodies, and nothing flows or breaks: PenaltyDeformableBodySolver has none of these limits. Every object has a force type of
 /// its own, so Bullet never merges two of them. The world does not own the force: remove the
 /// bodies from the world before the force goes.
 class DeformablePenaltyForce final : public btDeformableLagrangianForce {

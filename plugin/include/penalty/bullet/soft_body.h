@@ -1,9 +1,10 @@
-// Bullet soft bodies from tetrahedral meshes.
+// Bullet soft bodies from tetrahedral meshes and from surfaces.
 #pragma once
 #include <memory>
 #include <vector>
 
 #include "penalty/mesh/tet_mesh.h"
+#include "penalty/mesh/triangle_surface.h"
 
 class btSoftBody;
 struct btSoftBodyWorldInfo;
@@ -12,7 +13,7 @@ namespace penalty {
 
 struct SoftBodyOptions {
   Real mass = 1;                       // of the whole body [kg]
-  bool equal_masses = true;            // else each node carries its share of the volume; equal ones allow larger substeps
+  bool equal_masses = true;            // else each node carries its share of the volume or area; equal ones allow larger substeps
   std::vector<int> pinned = {};          // nodes of zero inverse mass
   Real margin = 0.02;                  // collision margin [m]
   Real friction = 0.5;                 // Coulomb coefficient, multiplied with that of the other body
@@ -25,6 +26,10 @@ struct SoftBodyOptions {
 /// tetrahedra of Bullet's, and links only on request: these cost time in every step, and the field replaces them. `mesh.vertices` give the
 /// start positions. Throws std::invalid_argument that names the option, index and value.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const SoftBodyOptions& options = {});
+
+/// The same from the triangles of a surface, open (cloth) or closed (a balloon): they become the faces, as they are.
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
                                            const SoftBodyOptions& options = {});
 
 }  // namespace penalty
