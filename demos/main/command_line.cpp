@@ -13,8 +13,10 @@ constexpr Real most_steps = 1e7, highest_rate = 1e6;
 
 std::string scene_list() {
   std::ostringstream text;
+  std::size_t width = 0;
+  for (const SceneEntry& scene : scenes()) width = std::max(width, scene.name.size());
   for (const SceneEntry& scene : scenes())
-    text << scene.name << std::string(8 - scene.name.size(), ' ') << scene.description << '\n';
+    text << scene.name << std::string(width + 2 - scene.name.size(), ' ') << scene.description << '\n';
   return text.str();
 }
 
@@ -72,7 +74,7 @@ CommandLine parse(int argc, const char* const* argv) {
 
   RunOptions options;
   SceneOptions& scene = options.scene_options;
-  std::string world = "classic", start = "rest", quality = "preview", backend = "auto", coloring = "energy";
+  std::string world = "classic", start = "rest", quality = "preview", backend = "auto", coloring = "energy", model;
   std::optional<long long> seed, seeds, cells, substeps, spheres;
   std::string out;
   bool no_render = false, no_scale = false;
@@ -89,7 +91,13 @@ CommandLine parse(int argc, const char* const* argv) {
   auto* stiffness =
       run->add_option("--stiffness", scene.stiffness, "K of every constraint [J], for a body of 1 kg")->type_name("J");
   run->add_option("--young", scene.young, "Young's modulus [Pa]")->type_name("PA")->excludes(stiffness);
-  run->add_option("--poisson", scene.poisson, "Poisson's ratio, 0.25 to 0.5")->type_name("N")->excludes(stiffness);
+  run->add_option("--poisson", scene.poisson,
+                  "Poisson's ratio, up to 0.5: from 0.25, of springs+areas 0.3, of neo-hookean 0")
+      ->type_name("N")
+      ->excludes(stiffness);
+  run->add_option("--model", model, "Of tetrahedra: springs (and volumes), springs+areas or neo-hookean")
+      ->type_name("NAME")
+      ->excludes(stiffness);
   run->add_option("--damping", scene.damping, "Ratio of damping to stiffness [s]")->type_name("S");
   run->add_option("--drag", scene.drag, "Rate at which velocities decay [1/s]")->type_name("RATE");
   run->add_option("--substeps", substeps, "Substeps in a world step; 0: from the stability limit")->type_name("N");
@@ -123,6 +131,7 @@ CommandLine parse(int argc, const char* const* argv) {
     find_scene(options.scene);
     options.world = world_from_name(world);
     scene.start = start_from_name(start);
+    if (run->count("--model") > 0) scene.model = model_from_name(model);
     options.quality = render::quality_from_name(quality);
     options.backend = render::backend_from_name(backend);
   } catch (const std::invalid_argument& error) {

@@ -48,13 +48,47 @@ std::unique_ptr<Scene> enter_world(const SceneEntry& entry, const RunOptions& op
   throw UsageError(one_line(error.what()));
 }
 
+std::vector<Figure> make_figures(const SceneEntry& entry, const SceneOptions& options) try {
+  return entry.figures(options);
+} catch (const std::invalid_argument& error) {
+  throw UsageError(one_line(error.what()));
+}
+
 bool worse(const Recording& a, const Recording& b) {
   if (a.finite != b.finite) return !a.finite;
   return a.rest_error > b.rest_error;
 }
 
+/// Writes the summary to wherever it is wanted, `description` if it is wanted nowhere.
+void hand_out(const nlohmann::ordered_json& summary, const std::string& description, const RunOptions& options,
+              std::optional<std::ofstream>& file) {
+  const std::string text = summary.dump(2) + "\n";
+  if (file) *file << text << std::flush;
+  if (options.summary == "-") std::cout << text << std::flush;
+  if (!options.summary) std::cout << description << std::flush;
+  if (options.out && !(std::ofstream(*options.out / "summary.json") << text << std::flush))
+    throw std::runtime_error((*options.out / "summary.json").string() + ": cannot be written");
+  if (file && !*file) throw std::runtime_error(*options.summary + ": cannot be written");
+}
+
+Status run_figures(const SceneEntry& entry, const RunOptions& options) {
+  const std::vector<Figure> figures = make_figures(entry, options.scene_options);
+  std::optional<std::ofstream> summary_file = open_summary(options);
+  if (options.out) make_directory(*options.out);
+  hand_out(summarize(figures, options), describe(figures), options, summary_file);
+  if (options.render && options.out) {
+    const Real duration = options.duration.value_or(entry.duration);
+    Progress progress("drawing", static_cast<long>(figures.size()) + num_figure_frames(duration));
+    const std::string remarks =
+        draw(figures, options, duration, *options.out, [&](long drawn) { progress.advance_to(drawn); });
+    if (!remarks.empty()) std::cerr << "penalty-demo: " << remarks << '\n';
+  }
+  return done;
+}
+
 Status run(RunOptions options) {
   const SceneEntry& entry = find_scene(options.scene);
+  if (entry.figures) return run_figures(entry, options);
   const Real duration = options.duration.value_or(entry.duration);
   const long steps = num_steps(duration, options.rate);
   const bool draws = options.render && options.out.has_value();
@@ -88,17 +122,11 @@ Status run(RunOptions options) {
     summary["recovered_runs"] = recovered;
     summary["each_seed"] = each_seed;
   }
-  const std::string text = summary.dump(2) + "\n";
-  if (summary_file) *summary_file << text << std::flush;
-  if (options.summary == "-") std::cout << text << std::flush;
-  if (!options.summary) std::cout << describe(summary) << std::flush;
+  hand_out(summary, describe(summary, worst->facts), options, summary_file);
   if (options.out) {
-    if (!(std::ofstream(*options.out / "summary.json") << text << std::flush))
-      throw std::runtime_error((*options.out / "summary.json").string() + ": cannot be written");
     write_csv(*options.out / "energies.csv", worst->steps);
     write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, worst->steps);
   }
-  if (summary_file && !*summary_file) throw std::runtime_error(*options.summary + ": cannot be written");
 
   if (draws) {
     Progress progress("drawing", static_cast<long>(worst->frames.size()) + 1);

@@ -1,5 +1,7 @@
 #include "main/outputs.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
@@ -7,18 +9,43 @@
 #include "render/plot.h"
 
 namespace penalty::demo {
+namespace {
+
+/// Names of batches as they head a column: without white space, and none twice.
+std::vector<std::string> column_names(const std::vector<BatchRecord>& batches) {
+  std::vector<std::string> names;
+  for (const BatchRecord& batch : batches) {
+    std::string name = batch.name;
+    for (char& c : name)
+      if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+    const std::string plain = name;
+    for (int k = 2; std::find(names.begin(), names.end(), name) != names.end(); ++k) name = plain + std::to_string(k);
+    names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace
 
 void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>& steps) {
   std::ofstream file(path);
   file.precision(10);
   file << "time,elastic,kinetic,rigid_kinetic,gravitational,total,length_error_mean,length_error_max,volume_error_mean,"
-          "volume_error_max,inverted,penetration,contact_depth,substeps,retries,milliseconds,tip_drop\n";
+          "volume_error_max,inverted,penetration,contact_depth,substeps,retries,milliseconds,tip_drop";
+  for (const EnergyFlow& flow : energy_flows) file << ',' << flow.name;
+  if (!steps.empty())
+    for (const std::string& name : column_names(steps.front().batches))
+      file << ',' << name << "_energy," << name << "_strain_mean," << name << "_strain_max";
+  file << '\n';
   for (const StepRecord& s : steps) {
     const Energies& e = s.energies;
     file << s.time << ',' << e.elastic << ',' << e.kinetic << ',' << e.rigid_kinetic << ',' << e.gravitational << ','
          << e.total() << ',' << s.errors.length_mean << ',' << s.errors.length_max << ',' << s.errors.volume_mean << ','
          << s.errors.volume_max << ',' << s.errors.inverted << ',' << s.penetration << ',' << s.contact_depth << ','
-         << s.substeps << ',' << s.retries << ',' << s.milliseconds << ',' << s.tip_drop << '\n';
+         << s.substeps << ',' << s.retries << ',' << s.milliseconds << ',' << s.tip_drop.value_or(0);
+    for (const EnergyFlow& flow : energy_flows) file << ',' << s.flows.*flow.member;
+    for (const BatchRecord& b : s.batches) file << ',' << b.energy << ',' << b.strain_mean << ',' << b.largest_strain;
+    file << '\n';
   }
   file.close();
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");

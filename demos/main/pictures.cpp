@@ -10,8 +10,15 @@
 namespace penalty::demo {
 namespace {
 
+constexpr Real figure_frames_per_second = 15;
+
 using render::Frame;
 using render::Overlay;
+
+struct DrawnShape {
+  render::Shape operator()(const Ball& ball) const { return render::Sphere{ball.radius}; }
+  render::Shape operator()(const Block& block) const { return render::Box{block.half_extents}; }
+};
 
 /// Turns recorded frames into what the renderer draws; everything but the camera is fixed for the clip.
 class Stage {
@@ -28,14 +35,14 @@ class Stage {
     if (setup_.ground) frame.ground = 0.0;
     render::SoftSurface surface;
     surface.vertices = setup_.body.drawn(record.positions);
-    surface.triangles = triangles_;
+    surface.triangles = record.triangles.empty() ? triangles_ : record.triangles;
     surface.values = drawn_values(record.values);
-    surface.wire = !setup_.body.surface;
+    surface.wire = setup_.look.wire && !setup_.body.surface;
     frame.surfaces.push_back(std::move(surface));
-    for (std::size_t b = 0; b < record.balls.size(); ++b) {
+    for (std::size_t b = 0; b < record.objects.size(); ++b) {
       render::Transform transform;
-      transform << record.balls[b].rotation, record.balls[b].position;
-      frame.bodies.push_back({.shape = render::Sphere{setup_.balls[b].radius},
+      transform << record.objects[b].rotation, record.objects[b].position;
+      frame.bodies.push_back({.shape = std::visit(DrawnShape(), setup_.objects[b].shape),
                               .transform = transform,
                               .color = render::palette(static_cast<int>(b)),
                               .two_tone = true});
@@ -46,22 +53,20 @@ class Stage {
 
   Overlay overlay(const FrameRecord& record) const {
     Overlay overlay;
-    overlay.title = title();
+    overlay.title = setup_.title;
     char time[32];
     std::snprintf(time, sizeof time, "t = %.2f s", record.time);
-    overlay.subtitle = {time, std::to_string(setup_.body.mesh.tetrahedra.size()) + " tetrahedra",
+    overlay.subtitle = {time,
+                        setup_.body.is_shell() ? std::to_string(triangles_.size()) + " triangles"
+                                               : std::to_string(setup_.body.solid().tetrahedra.size()) + " tetrahedra",
                         std::string(name_of(options_.world)) + " world, " + std::string(bullet_precision())};
     overlay.color_bar = options_.coloring == Coloring::energy
-                            ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() + "/m³]", unit()}
+                            ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() +
+                                                   (setup_.body.is_shell() ? "/m²]" : "/m³]"),
+                                               unit()}
                             : render::ColorBar{"mean |C|\nof lengths", 1};
     overlay.inset = curves(record.time);
     return overlay;
-  }
-
-  std::string title() const {
-    if (setup_.name == "beam") return "Clamped beam";
-    if (setup_.name == "flight") return "Free flight";
-    return "Drop among rigid balls";
   }
 
  private:
@@ -117,11 +122,11 @@ class Stage {
   render::ColorScale colors_;
 };
 
-render::Metadata metadata(const RunOptions& options, const Recording& recording, const Stage& stage) {
+render::Metadata metadata(const RunOptions& options, const Recording& recording, const SceneSetup& setup) {
   char parameters[160];
   std::snprintf(parameters, sizeof parameters, "scene %s, world %s, rate %g Hz, seed %u", options.scene.c_str(),
                 std::string(name_of(options.world)).c_str(), options.rate, recording.seed);
-  return {{"Title", stage.title()}, {"Description", parameters}, {"Software", "penalty-demo"}};
+  return {{"Title", setup.title}, {"Description", parameters}, {"Software", "penalty-demo"}};
 }
 
 }  // namespace
@@ -144,7 +149,7 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
     Frame frame = stage.frame(moment);
     frame.camera = frame_camera(bounds_of(frame), renderer.aspect(), view);
     write_png(directory / (setup.name + ".png"), renderer.render(frame, stage.overlay(moment)),
-              metadata(options, recording, stage));
+              metadata(options, recording, setup));
     progress(1);
   }
 
@@ -168,5 +173,52 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
         "no ffmpeg: the frames are in " + video.frames_directory().string() + "; encode them with " + video.command();
   return remarks;
 }
+
+std::string draw(const std::vector<Figure>& figures, const RunOptions& options, Real duration,
+                 const std::filesystem::path& directory, const std::function<void(long)>& progress) {
+  long done = 0;
+  {
+    render::Renderer renderer({.backend = options.backend, .quality = options.quality});
+    for (const Figure& figure : figures) {
+      Frame frame = figure.frame;
+      frame.camera = frame_camera(bounds_of(frame), renderer.aspect(), figure.view);
+      write_png(directory / (figure.name + ".png"), renderer.render(frame, figure.overlay),
+                {{"Title", figure.overlay.title}, {"Software", "penalty-demo"}});
+      progress(++done);
+    }
+  }
+  // Once round the first, at one distance: that from which all of it is seen from every side.
+  const Figure& figure = figures.front();
+  const bool finest = options.quality == render::Quality::still;
+  render::Renderer renderer({.backend = options.backend, .quality = finest ? render::Quality::video : options.quality});
+  render::VideoWriter video(directory / (figure.name + ".mp4"), renderer.width(), renderer.height(),
+                            {.frames_per_second = figure_frames_per_second});
+  const long frames = num_figure_frames(duration);
+  const auto camera = [&](long k) {
+    render::View view = figure.view;
+    view.azimuth += 360.0 * static_cast<double>(k) / static_cast<double>(frames);
+    return frame_camera(bounds_of(figure.frame), renderer.aspect(), view);
+  };
+  double distance = 0;
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();
+  for (long k = 0; k < frames; ++k) {
+    const render::Camera c = camera(k);
+    distance = std::max(distance, (c.eye - c.target).norm());
+    target += c.target / static_cast<double>(frames);
+  }
+  for (long k = 0; k < frames; ++k) {
+    Frame frame = figure.frame;
+    frame.camera = camera(k);
+    frame.camera.eye = target + distance * (frame.camera.eye - frame.camera.target).normalized();
+    frame.camera.target = target;
+    video.add(renderer.render(frame, figure.overlay));
+    progress(++done);
+  }
+  video.finish();
+  if (video.encoded()) return {};
+  return "no ffmpeg: the frames are in " + video.frames_directory().string() + "; encode them with " + video.command();
+}
+
+long num_figure_frames(Real duration) { return std::clamp(std::lround(duration * figure_frames_per_second), 1L, 900L); }
 
 }  // namespace penalty::demo

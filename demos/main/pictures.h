@@ -14,4 +14,9 @@ namespace penalty::demo {
 std::string draw(const Recording& recording, const RunOptions& options, const SceneSetup& setup, const FramePlan& plan,
                  const std::filesystem::path& directory, const std::function<void(long)>& progress);
 
+/// The same for figures: a still of each, named after it, and a clip of `duration` [s] that goes round the first.
+std::string draw(const std::vector<Figure>& figures, const RunOptions& options, Real duration,
+                 const std::filesystem::path& directory, const std::function<void(long)>& progress);
+long num_figure_frames(Real duration);  // in the clip
+
 }  // namespace penalty::demo

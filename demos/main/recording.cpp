@@ -5,6 +5,8 @@
 #include <ctime>
 #include <sstream>
 
+#include "scenes/element_energy.h"
+
 namespace penalty::demo {
 namespace {
 
@@ -15,52 +17,18 @@ Real thread_milliseconds() {
   return 1e3 * static_cast<Real>(now.tv_sec) + 1e-6 * static_cast<Real>(now.tv_nsec);
 }
 
-/// Values of elements handed down to their vertices, and divided by weights handed down in the same way.
-class VertexMean {
- public:
-  explicit VertexMean(Eigen::Index vertices) : sums_(Eigen::VectorXd::Zero(vertices)), weights_(sums_) {}
-
-  template <std::size_t N>
-  void add(const std::array<int, N>& stencil, Real value, Real weight) {
-    for (int i : stencil) {
-      sums_[i] += value / N;
-      weights_[i] += weight / N;
-    }
-  }
-
-  Eigen::VectorXd means() const { return (weights_.array() > 0).select(sums_.array() / weights_.array(), 0); }
-
- private:
-  Eigen::VectorXd sums_, weights_;
-};
-
-/// Elastic energy over rest volume [J/m³].
-Eigen::VectorXd energy_densities(const Scene& scene) {
-  const TetMesh& mesh = scene.setup().body.mesh;
-  VertexMean mean(mesh.vertices.cols());
-  const std::vector<Real> volumes = signed_volumes(mesh.vertices, mesh.tetrahedra);
-  for (std::size_t t = 0; t < volumes.size(); ++t) mean.add(mesh.tetrahedra[t], 0, volumes[t]);
-  const auto add = [&]<class Kind>(const Batch<Kind>* batch) {
-    if (!batch) return;
-    std::vector<Real> c;
-    batch->append_values(scene.particles().positions, c);
-    for (std::size_t e = 0; e < c.size(); ++e)
-      mean.add(batch->stencils()[e], batch->stiffnesses()[e] / 2 * c[e] * c[e], 0);
-  };
-  add(scene.field().find<Length>());
-  add(scene.field().find<TetrahedronVolume>());
-  return mean.means();
+/// Elastic energy over rest volume [J/m³], of a shell over rest area [J/m²]; 0 where a vertex stands for none.
+Eigen::VectorXd energy_densities(const Scene& scene, const Eigen::VectorXd& shares) {
+  const Eigen::VectorXd energies = particle_energies(scene.field(), scene.particles().positions);
+  return (shares.array() > 0).select(energies.array() / shares.array(), 0);
 }
 
-/// Mean |C| of the lengths around a vertex.
-Eigen::VectorXd strains(const Scene& scene) {
-  VertexMean mean(scene.setup().body.mesh.vertices.cols());
-  if (const auto* batch = scene.field().find<Length>()) {
-    std::vector<Real> c;
-    batch->append_values(scene.particles().positions, c);
-    for (std::size_t e = 0; e < c.size(); ++e) mean.add(batch->stencils()[e], std::abs(c[e]), 1);
-  }
-  return mean.means();
+std::vector<BatchRecord> batch_records(const Scene& scene) {
+  std::vector<BatchRecord> batches;
+  for (const LedgerEntry& entry : scene.ledger())
+    batches.push_back({std::string(entry.name), entry.num_elements, entry.num_enabled, entry.energy, entry.mean_strain,
+                       entry.largest_strain});
+  return batches;
 }
 
 std::string failure_message(const Scene& scene, long step, Real time) {
@@ -69,7 +37,7 @@ std::string failure_message(const Scene& scene, long step, Real time) {
   text << "step " << step << " (t = " << time << " s) is not finite";
   if (particle >= 0) {
     text << " at particle " << particle;
-    const auto& tetrahedra = scene.setup().body.mesh.tetrahedra;
+    const std::span<const Tetrahedron> tetrahedra = scene.setup().body.tetrahedra();
     const auto with = std::find_if(tetrahedra.begin(), tetrahedra.end(), [particle](const Tetrahedron& t) {
       return std::find(t.begin(), t.end(), particle) != t.end();
     });
@@ -79,6 +47,15 @@ std::string failure_message(const Scene& scene, long step, Real time) {
 }
 
 }  // namespace
+
+Real ledger_residual(const std::vector<StepRecord>& steps) {
+  const auto energy = [](const StepRecord& step) { return step.energies.elastic + step.energies.kinetic; };
+  Real largest = 0;
+  for (const StepRecord& step : steps) largest = std::max(largest, energy(step));
+  const EnergyFlows& flows = steps.back().flows;
+  const Real unexplained = energy(steps.back()) - energy(steps.front()) - flows.received() + flows.lost();
+  return largest > 0 ? std::abs(unexplained) / largest : 0;
+}
 
 FramePlan plan_frames(Real duration, Real rate) {
   constexpr Real frames_per_second = 30, most_frames = 900;
@@ -91,8 +68,9 @@ FramePlan plan_frames(Real duration, Real rate) {
 Recording record(Scene& scene, const RunOptions& options, long steps, const FramePlan& frames,
                  const std::function<void(long)>& progress) {
   const Real dt = 1 / options.rate;
-  const TetMesh& mesh = scene.setup().body.mesh;
-  const ShapeMeasure measure(mesh.vertices, mesh.tetrahedra);
+  const BodyMesh& body = scene.setup().body;
+  const ShapeMeasure measure(body.vertices(), body.edges(), body.tetrahedra());
+  const Eigen::VectorXd shares = body.vertex_shares();
   Recording recording;
   recording.seed = options.scene_options.seed;
 
@@ -110,8 +88,10 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
                       .substeps = report.substeps,
                       .retries = report.retries,
                       .milliseconds = milliseconds,
-                      .tip_drop = scene.tip_drop()};
-    recording.steps.push_back(record);
+                      .tip_drop = scene.tip_drop(),
+                      .batches = batch_records(scene),
+                      .flows = scene.flows()};
+    recording.steps.push_back(std::move(record));
     const Momenta now = scene.momenta();
     linear_drift = std::max(linear_drift, (now.linear - start.linear).norm());
     angular_drift = std::max(angular_drift, (now.angular - start.angular).norm());
@@ -119,8 +99,10 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
     angular_scale = std::max(angular_scale, now.angular_scale);
     if (frames.interval > 0 && (time >= next_frame - dt / 4)) {
       recording.frames.push_back({time, scene.particles().positions.topRows<3>(),
-                                  options.coloring == Coloring::energy ? energy_densities(scene) : strains(scene),
-                                  scene.balls()});
+                                  options.coloring == Coloring::energy
+                                      ? energy_densities(scene, shares)
+                                      : particle_strains(scene.field(), scene.particles().positions),
+                                  scene.objects(), unbroken_triangles(body, scene.field())});
       next_frame += frames.interval;
     }
   };
@@ -139,6 +121,7 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
     progress(step);
   }
 
+  recording.facts = scene.facts();
   recording.rest_error = measure.rest_error(scene.particles().positions);
   if (scene.is_free()) {
     recording.linear_drift = linear_scale > 0 ? linear_drift / linear_scale : 0;

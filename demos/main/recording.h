@@ -9,6 +9,14 @@
 
 namespace penalty::demo {
 
+/// One batch of elements after a step, or at the start.
+struct BatchRecord {
+  std::string name;
+  std::size_t elements = 0, enabled = 0;
+  Real energy = 0;                           // [J]
+  Real strain_mean = 0, largest_strain = 0;  // of |strain|
+};
+
 /// After a step, or at the start.
 struct StepRecord {
   Real time = 0;  // [s]
@@ -17,16 +25,34 @@ struct StepRecord {
   Real penetration = 0;    // below the true rigid surfaces [m]
   Real contact_depth = 0;  // below the planes of contact, which lie a margin outside [m]
   int substeps = 0, retries = 0;
-  Real milliseconds = 0;  // CPU time of the world step
-  Real tip_drop = 0;      // [m]
+  Real milliseconds = 0;             // CPU time of the world step
+  std::optional<Real> tip_drop;      // [m]
+  std::vector<BatchRecord> batches;  // in the order of the field
+  EnergyFlows flows;                 // of the soft body, since the start
 };
+
+/// The parts of EnergyFlows by name, as tables and summaries give them.
+struct EnergyFlow {
+  const char* name;
+  Real EnergyFlows::*member;
+};
+inline constexpr EnergyFlow energy_flows[] = {{"constant_forces", &EnergyFlows::constant_forces},
+                                              {"contacts", &EnergyFlows::contacts},
+                                              {"couplings", &EnergyFlows::couplings},
+                                              {"driving", &EnergyFlows::driving},
+                                              {"changes", &EnergyFlows::changes},
+                                              {"damping", &EnergyFlows::damping},
+                                              {"drag", &EnergyFlows::drag},
+                                              {"inelastic", &EnergyFlows::inelastic},
+                                              {"contact_loss", &EnergyFlows::contact_loss}};
 
 /// What a picture needs.
 struct FrameRecord {
   Real time = 0;
   Eigen::Matrix3Xd positions;  // of the simulated vertices [m]
   Eigen::VectorXd values;      // what the colours show, one a simulated vertex
-  std::vector<RigidPose> balls;
+  std::vector<Pose> objects;
+  std::vector<Triangle> triangles;  // that are left to draw; empty: all of them
 };
 
 struct Recording {
@@ -34,11 +60,16 @@ struct Recording {
   std::vector<StepRecord> steps;    // the start first
   std::vector<FrameRecord> frames;  // the start first; empty unless asked for
   Real rest_error = 0;
+  std::vector<Fact> facts;                          // of this scene alone, at the end
   std::optional<Real> linear_drift, angular_drift;  // relative; empty where something from outside acts
   bool finite = true;
   std::string failure;  // where a run that turned non-finite did so
   bool recovered() const { return finite && rest_error < 1e-2; }
 };
+
+/// |E - (E_start + received - lost)| over the largest E of the run, E the elastic and kinetic energy of the soft body
+/// at the end: what the energy ledger leaves unexplained. 0 where there is no energy at all.
+Real ledger_residual(const std::vector<StepRecord>& steps);
 
 /// Clips show 30 frames a second, or each step of a slower world; of a long run they are a time lapse.
 struct FramePlan {

@@ -40,6 +40,19 @@ Json energy_summary(const std::vector<Real>& energies) {
           {"final", number(energies.back())}};
 }
 
+/// What each batch holds at the end, and what came and went in the course of the run.
+Json ledger_summary(const std::vector<StepRecord>& steps) {
+  Json batches = Json::array(), flows;
+  for (const BatchRecord& b : steps.back().batches)
+    batches.push_back({{"name", b.name},
+                       {"elements", b.elements},
+                       {"enabled", b.enabled},
+                       {"energy", number(b.energy)},
+                       {"strain", {{"mean", number(b.strain_mean)}, {"max", number(b.largest_strain)}}}});
+  for (const EnergyFlow& flow : energy_flows) flows[flow.name] = number(steps.back().flows.*flow.member);
+  return {{"batches", batches}, {"flows", flows}, {"residual", number(ledger_residual(steps))}};
+}
+
 /// The first moment from which on the soft body keeps less than a hundredth of its largest kinetic energy.
 std::optional<Real> settling_time(const std::vector<StepRecord>& steps) {
   const Real limit = 0.01 * largest(column(steps, [](const auto& s) { return s.energies.kinetic; }));
@@ -61,7 +74,8 @@ std::optional<Real> mean_tip_drop(const std::vector<StepRecord>& steps) {
     if (after >= steps.size()) return {};
     const StepRecord &a = steps[after - 1], &b = steps[after];
     const Real share = std::min((time - a.time) / (b.time - a.time), 1.0);
-    sum += a.tip_drop + share * (b.tip_drop - a.tip_drop);
+    const Real before = a.tip_drop.value_or(0), now = b.tip_drop.value_or(0);
+    sum += before + share * (now - before);
   }
   return sum / 15;
 }
@@ -80,17 +94,17 @@ Json summarize(const Recording& recording, const RunOptions& options, const Body
   for (std::size_t i = 1; i < total.size(); ++i) gain = std::max(gain, total[i] - total[i - 1]);
   long retries = 0;
   for (const StepRecord& step : steps) retries += step.retries;
-  const std::string source = body.surface ? body.surface->surface.source : body.mesh.source;
 
   Json json;
   json["scene"] = options.scene;
   json["world"] = name_of(options.world);
   json["integrator"] = "explicit";
   json["precision"] = bullet_precision();
-  json["mesh"] = {{"source", source},
-                  {"vertices", body.mesh.vertices.cols()},
-                  {"tetrahedra", body.mesh.tetrahedra.size()},
-                  {"edges", edges_of(body.mesh.tetrahedra).size()}};
+  json["mesh"] = {{"source", body.source()},
+                  {"vertices", body.vertices().cols()},
+                  {"tetrahedra", body.tetrahedra().size()},
+                  {"triangles", body.drawn_triangles().size()},
+                  {"edges", body.edges().size()}};
   json["start"] = name_of(options.scene_options.start);
   json["seed"] = recording.seed;
   json["dt"] = 1 / options.rate;
@@ -111,29 +125,70 @@ Json summarize(const Recording& recording, const RunOptions& options, const Body
   json["penetration"] = number(largest(column(steps, [](const auto& s) { return s.penetration; })));
   json["contact_depth"] = number(largest(column(steps, [](const auto& s) { return s.contact_depth; })));
   json["momentum"] = {{"linear", number(recording.linear_drift)}, {"angular", number(recording.angular_drift)}};
-  if (options.scene == "beam") json["tip_drop"] = number(mean_tip_drop(steps));
+  json["ledger"] = ledger_summary(steps);
+  for (const Fact& fact : recording.facts) json[fact.name] = number(fact.value);
+  if (last.tip_drop) json["tip_drop"] = number(mean_tip_drop(steps));
   json["finite"] = recording.finite;
   json["recovered"] = recording.recovered();
   if (!recording.finite) json["failure"] = recording.failure;
   return json;
 }
 
-std::string describe(const Json& summary) {
+Json summarize(const std::vector<Figure>& figures, const RunOptions& options) {
+  Json json;
+  json["scene"] = options.scene;
+  for (const char* key : {"world", "integrator"}) json[key] = nullptr;
+  json["precision"] = bullet_precision();
+  json["mesh"] = {{"source", nullptr}, {"vertices", 0}, {"tetrahedra", 0}, {"triangles", 0}, {"edges", 0}};
+  json["seed"] = options.scene_options.seed;
+  json["dt"] = nullptr;
+  json["steps"] = 0;
+  bool finite = true;
+  for (const Figure& figure : figures)
+    for (const Fact& fact : figure.facts) {
+      json[fact.name] = number(fact.value);
+      finite = finite && std::isfinite(fact.value);
+    }
+  for (const char* key :
+       {"ms_per_step", "energy", "rest_error", "length_error", "volume_error", "inverted", "momentum", "ledger"})
+    json[key] = nullptr;
+  json["finite"] = finite;
+  json["recovered"] = nullptr;
+  return json;
+}
+
+std::string describe(const std::vector<Figure>& figures) {
+  std::ostringstream text;
+  for (const Figure& figure : figures) {
+    text << figure.name << '\n';
+    for (const Fact& fact : figure.facts) text << "  " << fact.name << ": " << fact.value << '\n';
+  }
+  return text.str();
+}
+
+std::string describe(const Json& summary, const std::vector<Fact>& facts) {
   std::ostringstream text;
   const Json& mesh = summary["mesh"];
+  const char* const elements = mesh["tetrahedra"] > 0 ? "tetrahedra" : "triangles";
   text << summary["scene"].get<std::string>() << ", " << summary["world"].get<std::string>() << " world, "
-       << summary["precision"].get<std::string>() << ": " << mesh["tetrahedra"] << " tetrahedra of "
+       << summary["precision"].get<std::string>() << ": " << mesh[elements] << ' ' << elements << " of "
        << mesh["source"].get<std::string>() << '\n'
        << "  " << summary["steps"] << " steps, " << summary["ms_per_step"]["median"] << " ms each, "
        << summary["substeps"]["mean"] << " substeps, " << summary["retries"] << " retries\n"
        << "  energy [J]: " << summary["energy"]["initial"] << " at first, " << summary["energy"]["final"]
        << " at the end, largest gain in a step " << summary["largest_energy_gain"] << '\n'
-       << "  at the end: rest error " << summary["rest_error"] << ", volume error " << summary["volume_error"]["mean"]
-       << " in the mean, " << summary["inverted"] << " inverted\n";
+       << "  at the end: rest error " << summary["rest_error"];
+  if (mesh["tetrahedra"] > 0)
+    text << ", volume error " << summary["volume_error"]["mean"] << " in the mean, " << summary["inverted"]
+         << " inverted\n";
+  else
+    text << ", length error " << summary["length_error"]["mean"] << " in the mean\n";
   if (!summary["momentum"]["linear"].is_null())
     text << "  momentum drift: linear " << summary["momentum"]["linear"] << ", angular "
          << summary["momentum"]["angular"] << '\n';
+  text << "  energy ledger: " << summary["ledger"]["residual"] << " of the largest energy unexplained\n";
   if (summary.contains("tip_drop")) text << "  tip drop [m]: " << summary["tip_drop"] << '\n';
+  for (const Fact& fact : facts) text << "  " << fact.name << ": " << fact.value << '\n';
   if (summary.contains("runs"))
     text << "  " << summary["recovered_runs"] << " of " << summary["runs"] << " runs recovered\n";
   return text.str();

@@ -24,12 +24,18 @@ struct Outline {
     for (const double end : {-c.half_height, c.half_height}) bounds.add(placed(0, end, 0), c.radius);
   }
   void operator()(const Cylinder& c) const {
+    for (const double end : {-c.half_height, c.half_height}) add_circle(c.radius, end);
+  }
+  void operator()(const Cone& c) const {
+    add_circle(c.radius, -c.half_height());
+    bounds.add(placed(0, c.half_height(), 0));
+  }
+  void add_circle(double radius, double y) const {
     constexpr int around = 16;
-    for (const double end : {-c.half_height, c.half_height})
-      for (int i = 0; i < around; ++i) {
-        const double turn = 2 * std::numbers::pi * i / around;
-        bounds.add(placed(c.radius * std::cos(turn), end, c.radius * std::sin(turn)));
-      }
+    for (int i = 0; i < around; ++i) {
+      const double turn = 2 * std::numbers::pi * i / around;
+      bounds.add(placed(radius * std::cos(turn), y, radius * std::sin(turn)));
+    }
   }
 };
 

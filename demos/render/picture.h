@@ -45,7 +45,14 @@ struct Cylinder {  // along its y axis
   double radius;
   double half_height;
 };
-using Shape = std::variant<Sphere, Box, Capsule, Cylinder>;
+/// The head of an arrow: along its y axis, its tip at +half_height(). All cones are of one proportion, so that one mesh
+/// has the normals of all.
+struct Cone {
+  double radius;
+  static constexpr double slope = 2.6;  // height over radius
+  double half_height() const { return slope / 2 * radius; }
+};
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Cone>;
 
 struct RigidBody {
   Shape shape;

@@ -61,6 +61,17 @@ RigidMesh box() {
   return mesh;
 }
 
+/// A disc that closes the end y = `end` (1 or -1).
+void add_lid(RigidMesh& mesh, float end) {
+  const auto center = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.push_back(vertex({0, end, 0}, {0, 0, 0}, {0, end, 0}));
+  for (int i = 0; i <= around; ++i) mesh.vertices.push_back(vertex({0, end, 0}, on_circle(i, 1, 0), {0, end, 0}));
+  for (std::uint32_t i = 0; i < around; ++i) {
+    const std::uint32_t a = center + 1 + i, b = a + 1;
+    mesh.indices.insert(mesh.indices.end(), {center, end > 0 ? a : b, end > 0 ? b : a});
+  }
+}
+
 RigidMesh cylinder() {
   RigidMesh mesh;
   for (const float end : {1.f, -1.f})
@@ -69,15 +80,20 @@ RigidMesh cylinder() {
       mesh.vertices.push_back(vertex({0, end, 0}, direction, direction));
     }
   join_rings(mesh, 0, around + 1);
-  for (const float end : {1.f, -1.f}) {
-    const auto center = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.vertices.push_back(vertex({0, end, 0}, {0, 0, 0}, {0, end, 0}));
-    for (int i = 0; i <= around; ++i) mesh.vertices.push_back(vertex({0, end, 0}, on_circle(i, 1, 0), {0, end, 0}));
-    for (std::uint32_t i = 0; i < around; ++i) {
-      const std::uint32_t a = center + 1 + i, b = a + 1;
-      mesh.indices.insert(mesh.indices.end(), {center, end > 0 ? a : b, end > 0 ? b : a});
+  for (const float end : {1.f, -1.f}) add_lid(mesh, end);
+  return mesh;
+}
+
+RigidMesh cone() {
+  RigidMesh mesh;
+  for (const float end : {1.f, -1.f})  // the tip once for each segment, so that it is as smooth as the rest
+    for (int i = 0; i <= around; ++i) {
+      const Eigen::Vector3f direction = on_circle(i, 1, 0);
+      const Eigen::Vector3f normal = on_circle(i, static_cast<float>(Cone::slope), 1).normalized();
+      mesh.vertices.push_back(vertex({0, end, 0}, (end < 0 ? 1.f : 0.f) * direction, normal));
     }
-  }
+  join_rings(mesh, 0, around + 1);
+  add_lid(mesh, -1);
   return mesh;
 }
 
@@ -86,6 +102,7 @@ struct SizeOf {
   Eigen::Vector4d operator()(const Box& b) const { return b.half_extents.homogeneous() - Eigen::Vector4d::UnitW(); }
   Eigen::Vector4d operator()(const Capsule& c) const { return {0, c.half_height, 0, c.radius}; }
   Eigen::Vector4d operator()(const Cylinder& c) const { return {0, c.half_height, 0, c.radius}; }
+  Eigen::Vector4d operator()(const Cone& c) const { return {0, c.half_height(), 0, c.radius}; }
 };
 
 }  // namespace
@@ -100,6 +117,8 @@ RigidMesh rigid_mesh(std::size_t shape) {
       return round(true);
     case 3:
       return cylinder();
+    case 4:
+      return cone();
     default:
       throw std::invalid_argument("unknown rigid shape");
   }

@@ -29,20 +29,21 @@ PotentialField reference_field(const TetMesh& mesh, Real cell) {
 }  // namespace
 
 BodyMesh beam_body(const SceneOptions& options) {
-  if (!options.mesh.empty()) throw std::invalid_argument("scene beam makes its own mesh: --mesh does not apply");
+  refuse_mesh(options, "beam");
   const int cells = options.cells.value_or(32);
   if (cells < 4 || cells > 200 || cells % 4 != 0)
     throw std::invalid_argument("--cells is " + std::to_string(cells) +
                                 ", must be a multiple of 4 from 4 to 200 for the beam");
-  return {make_beam(cells / 4), {}};
+  return {make_beam(cells / 4)};
 }
 
 SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
-  const Eigen::Matrix3Xd& rest = body.mesh.vertices;
-  const bool reference = !options.stiffness && !options.young && !options.poisson;
+  const Eigen::Matrix3Xd& rest = body.vertices();
+  const bool reference = !options.stiffness && !options.young && !options.poisson && !options.model;
   const Real cell = 4.0 / options.cells.value_or(32);
-  Elasticity elastic = reference ? Elasticity{reference_field(body.mesh, cell), density * volume(body.mesh)}
-                                 : elasticity(options, body.mesh, {.young = young, .poisson = 0.3, .density = density});
+  Elasticity elastic = reference
+                           ? Elasticity{reference_field(body.solid(), cell), density * volume(body.solid())}
+                           : elasticity(options, body.solid(), {.young = young, .poisson = 0.3, .density = density});
 
   std::vector<int> pinned, tip;
   const Real length = rest.row(0).maxCoeff();
@@ -54,6 +55,7 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
   for (int i : pinned) positions.col(i) = rest.col(i);
 
   return {.name = "beam",
+          .title = "Clamped beam",
           .body = body,
           .field = std::move(elastic.field),
           .mass = elastic.mass,
@@ -62,7 +64,7 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
           .pinned = pinned,
           .gravity = {0, -9.81, 0},
           .ground = false,
-          .balls = {},
+          .objects = {},
           .step = step_options(options, {.drag = drag}),
           .tip = tip,
           .look = {.azimuth = 24, .elevation = 12, .still_time = 0.5}};  // when it hangs deepest

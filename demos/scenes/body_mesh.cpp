@@ -22,21 +22,13 @@ void place(Eigen::Matrix3Xd& vertices, bool scale) {
   vertices = (vertices.colwise() - (low + high) / 2) * factor;
 }
 
-int cells_in(const SceneOptions& options, int by_default, int most) {
-  const int cells = options.cells.value_or(by_default);
-  if (cells < 2 || cells > most)
-    throw std::invalid_argument("--cells is " + std::to_string(cells) + ", must be 2 to " + std::to_string(most) +
-                                " for this mesh");
-  return cells;
-}
-
 BodyMesh built(TetMesh mesh, bool scale) {
   place(mesh.vertices, scale);
-  return {std::move(mesh), {}};
+  return {std::move(mesh)};
 }
 
 BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options) {
-  const int cells = cells_in(options, lattice_cells, 200);
+  const int cells = cells_in(options, lattice_cells, 2, 200);
   TriangleSurface surface = read_surface(path);
   place(surface.vertices, options.scale);
   try {
@@ -49,22 +41,53 @@ BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options
 
 }  // namespace
 
+const Eigen::Matrix3Xd& BodyMesh::vertices() const {
+  return std::visit([](const auto& m) -> const Eigen::Matrix3Xd& { return m.vertices; }, mesh);
+}
+
+std::span<const Tetrahedron> BodyMesh::tetrahedra() const {
+  return is_shell() ? std::span<const Tetrahedron>() : solid().tetrahedra;
+}
+
+std::vector<Edge> BodyMesh::edges() const {
+  return is_shell() ? edges_of(shell().triangles) : edges_of(solid().tetrahedra);
+}
+
+std::string BodyMesh::source() const {
+  if (surface) return surface->surface.source;
+  return is_shell() ? shell().source : solid().source;
+}
+
+Eigen::VectorXd BodyMesh::vertex_shares() const {
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(vertices().cols());
+  const auto share_out = [&shares](const auto& elements, const std::vector<Real>& sizes) {
+    for (std::size_t e = 0; e < sizes.size(); ++e)
+      for (int i : elements[e]) shares[i] += sizes[e] / static_cast<Real>(elements[e].size());
+  };
+  if (is_shell())
+    share_out(shell().triangles, areas_of(vertices(), shell().triangles));
+  else
+    share_out(solid().tetrahedra, signed_volumes(vertices(), solid().tetrahedra));
+  return shares;
+}
+
 Eigen::Matrix3Xd BodyMesh::drawn(const Eigen::Matrix3Xd& positions) const {
   return surface ? skin(*surface, positions) : positions;
 }
 
 std::vector<Triangle> BodyMesh::drawn_triangles() const {
-  return surface ? surface->surface.triangles : boundary_faces(mesh.tetrahedra);
+  if (is_shell()) return shell().triangles;
+  return surface ? surface->surface.triangles : boundary_faces(solid().tetrahedra);
 }
 
 std::vector<ContactPoint> BodyMesh::contact_points() const {
   std::vector<ContactPoint> points;
   if (!surface) return points;
   // The lattice knows its cell only through its shape: the longest edge of a tetrahedron is one cell long.
-  const Tetrahedron& t = mesh.tetrahedra.front();
+  const Tetrahedron& t = solid().tetrahedra.front();
   Real cell = 0;
   for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < i; ++j) cell = std::max(cell, (mesh.vertices.col(t[i]) - mesh.vertices.col(t[j])).norm());
+    for (int j = 0; j < i; ++j) cell = std::max(cell, (vertices().col(t[i]) - vertices().col(t[j])).norm());
   for (int vertex : contact_samples(*surface, cell / samples_per_cell)) {
     ContactPoint point;
     point.particles = surface->stencils[vertex];
@@ -80,12 +103,12 @@ std::filesystem::path bunny_path() { return "/usr/share/glmark2/models/bunny.obj
 BodyMesh load_body(const SceneOptions& options, const std::string& by_default) {
   const std::string& name = options.mesh.empty() ? by_default : options.mesh;
   if (name == "torus") {
-    const int cells = cells_in(options, 20, 400);
+    const int cells = cells_in(options, 20, 2, 400);
     return built(make_torus(0.7, 0.3, std::max(1, cells * 3 / 20), std::max(3, cells * 27 / 20)), options.scale);
   }
-  if (name == "ball") return built(make_ball(1, cells_in(options, 12, 100) / 2), options.scale);
+  if (name == "ball") return built(make_ball(1, cells_in(options, 12, 2, 100) / 2), options.scale);
   if (name == "box") {
-    const int cells = cells_in(options, 10, 100);
+    const int cells = cells_in(options, 10, 2, 100);
     return built(make_box({2, 2, 2}, {cells, cells, cells}), options.scale);
   }
   if (name == "bunny") {
@@ -96,10 +119,27 @@ BodyMesh load_body(const SceneOptions& options, const std::string& by_default) {
   if (is_surface_file(name)) return embedded(name, options);
   if (!is_tetrahedral_mesh_file(name) && !std::filesystem::exists(name))
     throw MeshError(name + ": no such file, and none of bunny, torus, ball, box");
-  BodyMesh body{read_mesh(name), {}};
+  TetMesh mesh = read_mesh(name);
   if (options.cells) throw std::invalid_argument("--cells does not apply to a mesh that has its tetrahedra");
-  place(body.mesh.vertices, options.scale);
-  return body;
+  return built(std::move(mesh), options.scale);
+}
+
+int cells_in(const SceneOptions& options, int by_default, int least, int most) {
+  const int cells = options.cells.value_or(by_default);
+  if (cells < least || cells > most)
+    throw std::invalid_argument("--cells is " + std::to_string(cells) + ", must be " + std::to_string(least) + " to " +
+                                std::to_string(most) + " for this mesh");
+  return cells;
+}
+
+void refuse_mesh(const SceneOptions& options, std::string_view scene) {
+  if (!options.mesh.empty())
+    throw std::invalid_argument("scene " + std::string(scene) + " makes its own mesh: --mesh does not apply");
+}
+
+void refuse_model(const SceneOptions& options, std::string_view scene) {
+  if (options.model)
+    throw std::invalid_argument("scene " + std::string(scene) + " is about its own elements: --model does not apply");
 }
 
 }  // namespace penalty::demo

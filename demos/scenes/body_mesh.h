@@ -1,7 +1,8 @@
-// The soft body of a scene: built, read, or embedded in a lattice.
+// The soft body of a scene: built, read, or embedded in a lattice; solid, or a shell of triangles.
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <variant>
 
 #include "penalty/mesh/embed.h"
 #include "penalty/solvers/contact.h"
@@ -10,8 +11,21 @@
 namespace penalty::demo {
 
 struct BodyMesh {
-  TetMesh mesh;                            // what is simulated
-  std::optional<EmbeddedSurface> surface;  // what is drawn and touches, where that is not the boundary of the mesh
+  std::variant<TetMesh, TriangleSurface> mesh;  // what is simulated
+  std::optional<EmbeddedSurface> surface = {};  // what is drawn and touches, where that is not the boundary of the mesh
+
+  bool is_shell() const { return std::holds_alternative<TriangleSurface>(mesh); }
+  const TetMesh& solid() const { return std::get<TetMesh>(mesh); }
+  const TriangleSurface& shell() const { return std::get<TriangleSurface>(mesh); }
+
+  // Whichever of the two it is.
+  const Eigen::Matrix3Xd& vertices() const;         // at rest [m]
+  std::span<const Tetrahedron> tetrahedra() const;  // none of a shell
+  std::vector<Edge> edges() const;
+  std::string source() const;  // of what is drawn
+
+  /// The part of the rest volume of a solid [m³], of the rest area of a shell [m²], that each vertex stands for.
+  Eigen::VectorXd vertex_shares() const;
 
   /// The drawn surface where `positions`, 3 x vertices of the mesh, take it [m].
   Eigen::Matrix3Xd drawn(const Eigen::Matrix3Xd& positions) const;
@@ -27,5 +41,14 @@ std::filesystem::path bunny_path();
 /// The mesh of `options.mesh`, or of `by_default`, about the origin. Throws MeshError for a file that is no usable mesh
 /// and std::invalid_argument for an unknown name or an impossible number of cells; both say it in one line.
 BodyMesh load_body(const SceneOptions& options, const std::string& by_default);
+
+/// options.cells, or `by_default`; throws std::invalid_argument unless it is `least` to `most`.
+int cells_in(const SceneOptions& options, int by_default, int least, int most);
+
+/// For scenes that make their own mesh: throws std::invalid_argument if the user names one.
+void refuse_mesh(const SceneOptions& options, std::string_view scene);
+
+/// For scenes whose elements are what they show: throws if the user names a model of elasticity.
+void refuse_model(const SceneOptions& options, std::string_view scene);
 
 }  // namespace penalty::demo

@@ -18,20 +18,21 @@ constexpr Real ball_density = 1;  // of the soft body's
 
 /// Balls on the ground, spread like the seeds of a sunflower: never touching, and no rows. The middle stays free, so
 /// that a body of 2 m comes down between them.
-std::vector<Ball> scattered(int count, Real density, std::uint32_t seed) {
+std::vector<RigidObject> scattered(int count, Real density, std::uint32_t seed) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random](Real low, Real high) {
     return low + (high - low) * static_cast<Real>(random() >> 11) * 0x1p-53;
   };
   const Real turn = uniform(0, 2 * std::numbers::pi), golden = std::numbers::pi * (3 - std::sqrt(5.0));
   constexpr Real spacing = 0.72, first = 2.2;
-  std::vector<Ball> balls;
+  std::vector<RigidObject> balls;
   for (int i = 0; i < count; ++i) {
     const Real distance = spacing * std::sqrt(i + first), angle = turn + golden * i;
     const Real radius = uniform(0.16, 0.32);
-    balls.push_back({{distance * std::cos(angle), radius, distance * std::sin(angle)},
-                     radius,
-                     density * 4 / 3 * std::numbers::pi * radius * radius * radius});
+    const Vector3 place(distance * std::cos(angle), radius, distance * std::sin(angle));
+    balls.push_back({.shape = Ball{radius},
+                     .pose = {.position = place},
+                     .mass = density * 4 / 3 * std::numbers::pi * radius * radius * radius});
   }
   return balls;
 }
@@ -44,12 +45,13 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
   const int count = options.spheres.value_or(num_balls);
   if (count < 0 || count > 1000)
     throw std::invalid_argument("--spheres is " + std::to_string(count) + ", must be 0 to 1000");
-  Elasticity elastic = elasticity(options, body.mesh, jelly);
+  Elasticity elastic = elasticity(options, body.solid(), jelly);
 
-  Eigen::Matrix3Xd positions = start_positions(body.mesh.vertices, options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start, options.seed);
   positions.row(1).array() += height - body.drawn(positions).row(1).minCoeff();
 
   return {.name = "drop",
+          .title = "Drop among rigid balls",
           .body = body,
           .field = std::move(elastic.field),
           .mass = elastic.mass,
@@ -58,7 +60,7 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
           .pinned = {},
           .gravity = {0, -9.81, 0},
           .ground = true,
-          .balls = scattered(count, ball_density * elastic.mass / volume(body.mesh), options.seed),
+          .objects = scattered(count, ball_density * elastic.mass / volume(body.solid()), options.seed),
           .step = step_options(options, {.damping_time = jelly_damping}),
           .tip = {},
           .look = {.still_time = 0.76}};  // on the ground, flattest

@@ -16,10 +16,10 @@ BodyMesh flight_body(const SceneOptions& options) { return load_body(options, "t
 
 SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
   SceneOptions chosen = options;
-  if (!options.stiffness && !options.young && !options.poisson) chosen.stiffness = stiffness;
-  Elasticity elastic = elasticity(chosen, body.mesh, {});
+  if (!options.stiffness && !options.young && !options.poisson && !options.model) chosen.stiffness = stiffness;
+  Elasticity elastic = elasticity(chosen, body.solid(), {});
 
-  Eigen::Matrix3Xd positions = start_positions(body.mesh.vertices, options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start, options.seed);
   Eigen::Matrix3Xd velocities = Eigen::Matrix3Xd::Zero(3, positions.cols());
   const bool hard = options.start != Start::rest;
   if (!hard) {
@@ -28,6 +28,7 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
     for (int i = 0; i < positions.cols(); ++i) velocities.col(i) = drift + spin.cross(Vector3(positions.col(i)));
   }
   return {.name = "flight",
+          .title = "Free flight",
           .body = body,
           .field = std::move(elastic.field),
           .mass = elastic.mass,
@@ -36,7 +37,7 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
           .pinned = {},
           .gravity = {0, 0, 0},
           .ground = false,
-          .balls = {},
+          .objects = {},
           .step = step_options(options, {.damping_time = hard ? hard_damping : 0, .safety = safety}),
           .tip = {},
           .look = {.azimuth = 20, .elevation = 32}};

@@ -29,6 +29,20 @@ Matrix3 from_bullet(const btMatrix3x3& m) {
   return result;
 }
 
+btTransform to_bullet(const Pose& pose) {
+  const Matrix3& r = pose.rotation;
+  const auto row = [&r](int i) { return to_bullet(Vector3(r.row(i).transpose())); };
+  const btVector3 x = row(0), y = row(1), z = row(2);
+  return btTransform(btMatrix3x3(x.x(), x.y(), x.z(), y.x(), y.y(), y.z(), z.x(), z.y(), z.z()),
+                     to_bullet(pose.position));
+}
+
+std::unique_ptr<btConvexInternalShape> make_shape(const RigidObject& object) {
+  if (const auto* ball = std::get_if<Ball>(&object.shape))
+    return std::make_unique<btSphereShape>(static_cast<btScalar>(ball->radius));
+  return std::make_unique<btBoxShape>(to_bullet(std::get<Block>(object.shape).half_extents));
+}
+
 /// Either world of Bullet with the plugin's solver in it. Members are destroyed from the last to the first: the world
 /// goes before the solvers it points to.
 class World {
@@ -88,10 +102,12 @@ struct Scene::Impl {
   SceneSetup setup;
   World world;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
-  std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the balls, then the ground
+  std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the objects, then the ground
   std::unique_ptr<btSoftBody> body;
   std::vector<ContactPoint> contact_points;
-  Real tip_start = 0;
+  Real tip_start = 0, time = 0;
+  Real time_asleep = 0;  // [s]
+  int wakings = 0;
 
   Impl(SceneSetup given, WorldKind kind) : setup(std::move(given)), world(kind) {
     btSoftBodyWorldInfo& info = world.info();
@@ -103,11 +119,10 @@ struct Scene::Impl {
     info.m_sparsesdf.setDefaultVoxelsz(static_cast<btScalar>(voxel_size()));
     world.world().setGravity(to_bullet(setup.gravity));
 
-    for (const Ball& ball : setup.balls)
-      add_rigid(std::make_unique<btSphereShape>(static_cast<btScalar>(ball.radius)), ball.mass, ball.position);
+    for (const RigidObject& object : setup.objects) add_rigid(object);
     if (setup.ground)
-      add_rigid(std::make_unique<btBoxShape>(to_bullet({ground_half_width, ground_half_height, ground_half_width})), 0,
-                {0, -ground_half_height, 0});
+      add_rigid({.shape = Block{{ground_half_width, ground_half_height, ground_half_width}},
+                 .pose = {.position = {0, -ground_half_height, 0}}});
     add_soft();
   }
 
@@ -120,18 +135,23 @@ struct Scene::Impl {
   /// Bullet samples rigid shapes on a grid: a tenth of the smallest is fine enough for its corners.
   Real voxel_size() const {
     Real smallest = 2 * ground_half_height;
-    for (const Ball& ball : setup.balls) smallest = std::min(smallest, 2 * ball.radius);
+    for (const RigidObject& object : setup.objects) smallest = std::min(smallest, thickness(object));
     return smallest / 10;
   }
 
-  void add_rigid(std::unique_ptr<btConvexInternalShape> shape, Real mass, const Vector3& position) {
-    btVector3 inertia(0, 0, 0);
-    if (mass > 0) shape->calculateLocalInertia(static_cast<btScalar>(mass), inertia);
-    btRigidBody::btRigidBodyConstructionInfo info(static_cast<btScalar>(mass), nullptr, shape.get(), inertia);
-    info.m_startWorldTransform.setOrigin(to_bullet(position));
+  void add_rigid(const RigidObject& object) {
+    std::unique_ptr<btConvexInternalShape> shape = make_shape(object);
+    const Real mass = object.pushes_back() ? object.mass : 0;
+    btRigidBody::btRigidBodyConstructionInfo info(static_cast<btScalar>(mass), nullptr, shape.get(),
+                                                  to_bullet(mass > 0 ? inertia(object) : Vector3::Zero()));
+    info.m_startWorldTransform = to_bullet(object.path ? object.path(0) : object.pose);
     info.m_friction = 0.7f;
     info.m_rollingFriction = 0.05f;
     auto body_of_shape = std::make_unique<btRigidBody>(info);
+    if (object.path) {
+      body_of_shape->setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+      body_of_shape->setActivationState(DISABLE_DEACTIVATION);
+    }
     world.world().addRigidBody(body_of_shape.get());
     rigid_bodies.push_back(std::move(body_of_shape));
     shapes.push_back(std::move(shape));
@@ -142,11 +162,16 @@ struct Scene::Impl {
     options.mass = setup.mass;
     options.pinned = setup.pinned;
     options.friction = 0.7;
-    TetMesh started = setup.body.mesh;
-    started.vertices = setup.positions;
-    body = make_soft_body(world.info(), started, options);
+    auto started = setup.body.mesh;
+    body = std::visit(
+        [&](auto& mesh) {
+          mesh.vertices = setup.positions;
+          return make_soft_body(world.info(), mesh, options);
+        },
+        started);
     for (int i = 0; i < body->m_nodes.size(); ++i) body->m_nodes[i].m_v = to_bullet(setup.velocities.col(i));
-    body->setActivationState(DISABLE_DEACTIVATION);  // what is measured does not fall asleep
+    // What is measured does not fall asleep, unless sleep is what the scene shows.
+    body->forceActivationState(setup.sleeps ? ACTIVE_TAG : DISABLE_DEACTIVATION);
     world.add(body.get());
     AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
     contact_points = attach.contact_points;
@@ -168,12 +193,30 @@ struct Scene::Impl {
 Scene::Scene(SceneSetup setup, WorldKind world) : impl_(std::make_unique<Impl>(std::move(setup), world)) {}
 Scene::~Scene() = default;
 
-void Scene::step(Real duration) { impl_->world.world().stepSimulation(static_cast<btScalar>(duration), 0); }
+void Scene::step(Real duration) {
+  Impl& scene = *impl_;
+  const bool was_asleep = is_asleep();
+  if (scene.setup.control && scene.time >= scene.setup.control_start - duration / 4)
+    scene.setup.control(scene.world.attached().edit(*scene.body), scene.time);
+  scene.time += duration;
+  for (std::size_t b = 0; b < scene.setup.objects.size(); ++b)
+    if (const auto& path = scene.setup.objects[b].path)
+      scene.rigid_bodies[b]->setWorldTransform(to_bullet(path(scene.time)));  // Bullet makes a velocity of the way
+  scene.world.world().stepSimulation(static_cast<btScalar>(duration), 0);
+  if (is_asleep()) scene.time_asleep += duration;
+  if (was_asleep && !is_asleep()) ++scene.wakings;
+  if (scene.setup.watch) scene.setup.watch(particles().positions, field(), scene.time);
+}
+
+Real Scene::time() const { return impl_->time; }
 
 const SceneSetup& Scene::setup() const { return impl_->setup; }
 const PotentialField& Scene::field() const { return impl_->world.attached().field(*impl_->body); }
 const Particles& Scene::particles() const { return impl_->particles(); }
 const StepReport& Scene::report() const { return impl_->world.attached().report(*impl_->body); }
+std::vector<LedgerEntry> Scene::ledger() const { return impl_->world.attached().ledger(*impl_->body); }
+const EnergyFlows& Scene::flows() const { return impl_->world.attached().flows(*impl_->body); }
+bool Scene::is_asleep() const { return impl_->body->getActivationState() == ISLAND_SLEEPING; }
 
 Energies Scene::energies() const {
   const Particles& p = particles();
@@ -182,12 +225,15 @@ Energies Scene::energies() const {
   for (int i = 0; i < p.size(); ++i)
     if (p.inverse_masses[i] > 0)
       energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
-  for (std::size_t b = 0; b < impl_->setup.balls.size(); ++b) {
+  for (std::size_t b = 0; b < impl_->setup.objects.size(); ++b) {
+    const RigidObject& object = impl_->setup.objects[b];
+    if (!object.pushes_back()) continue;
     const btRigidBody& rigid = *impl_->rigid_bodies[b];
-    const Real mass = impl_->setup.balls[b].mass, inertia = 0.4 * mass * std::pow(impl_->setup.balls[b].radius, 2);
-    energies.rigid_kinetic += mass / 2 * from_bullet(rigid.getLinearVelocity()).squaredNorm() +
-                              inertia / 2 * from_bullet(rigid.getAngularVelocity()).squaredNorm();
-    energies.gravitational -= mass * gravity.dot(from_bullet(rigid.getCenterOfMassPosition()));
+    const Vector3 spin =
+        from_bullet(rigid.getCenterOfMassTransform().getBasis()).transpose() * from_bullet(rigid.getAngularVelocity());
+    energies.rigid_kinetic += object.mass / 2 * from_bullet(rigid.getLinearVelocity()).squaredNorm() +
+                              spin.dot(inertia(object).cwiseProduct(spin)) / 2;
+    energies.gravitational -= object.mass * gravity.dot(from_bullet(rigid.getCenterOfMassPosition()));
   }
   return energies;
 }
@@ -204,10 +250,10 @@ Momenta Scene::momenta() const {
   return momenta;
 }
 
-std::vector<RigidPose> Scene::balls() const {
-  std::vector<RigidPose> poses;
-  for (std::size_t b = 0; b < impl_->setup.balls.size(); ++b) {
-    const btTransform& transform = impl_->rigid_bodies[b]->getCenterOfMassTransform();
+std::vector<Pose> Scene::objects() const {
+  std::vector<Pose> poses;
+  for (std::size_t b = 0; b < impl_->setup.objects.size(); ++b) {
+    const btTransform& transform = impl_->rigid_bodies[b]->getWorldTransform();
     poses.push_back({from_bullet(transform.getBasis()), from_bullet(transform.getOrigin())});
   }
   return poses;
@@ -215,23 +261,36 @@ std::vector<RigidPose> Scene::balls() const {
 
 Real Scene::penetration() const {
   const PackedVectors& x = particles().positions;
-  const std::vector<RigidPose> poses = balls();
+  const std::vector<Pose> poses = objects();
   Real deepest = 0;
   for (const ContactPoint& point : impl_->contact_points) {
     Vector3 position = Vector3::Zero();
     for (int k = 0; k < point.num_particles; ++k) position += point.weights[k] * x.col(point.particles[k]).head<3>();
     if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
     for (std::size_t b = 0; b < poses.size(); ++b)
-      deepest = std::max(deepest, impl_->setup.balls[b].radius - (position - poses[b].position).norm());
+      deepest = std::max(deepest, depth(impl_->setup.objects[b], poses[b], position));
   }
   return deepest;
 }
 
-Real Scene::tip_drop() const { return impl_->tip_start - impl_->mean_tip_height(particles().positions); }
+std::optional<Real> Scene::tip_drop() const {
+  if (impl_->setup.tip.empty()) return {};
+  return impl_->tip_start - impl_->mean_tip_height(particles().positions);
+}
+
+std::vector<Fact> Scene::facts() const {
+  const Impl& scene = *impl_;
+  std::vector<Fact> facts = scene.setup.facts ? scene.setup.facts(particles().positions, field()) : std::vector<Fact>{};
+  if (scene.setup.sleeps) {
+    facts.push_back({"time_asleep", scene.time_asleep});
+    facts.push_back({"wakings", static_cast<double>(scene.wakings)});
+  }
+  return facts;
+}
 
 bool Scene::is_free() const {
   const SceneSetup& setup = impl_->setup;
-  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.balls.empty() &&
+  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.objects.empty() &&
          setup.step.drag == 0;
 }
 

@@ -8,7 +8,16 @@ const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> list{
       {"drop", "a mesh, by default the Stanford bunny, falls on the ground among rigid balls", 3, drop_body, drop},
       {"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2, beam_body, beam},
-      {"flight", "a stretched, spinning body flies freely", 10, flight_body, flight}};
+      {"flight", "a stretched, spinning body flies freely", 10, flight_body, flight},
+      {"cloth", "a sheet, held at its corners, catches a ball", 4, cloth_body, cloth},
+      {"balloon", "a balloon is blown up until it encloses two and a half times its volume", 4, balloon_body, balloon},
+      {"muscle", "a worm wakes up and crawls: its fibres contract one after another", 12, muscle_body, muscle},
+      {"plastic", "a ball is pressed into a block of metal and withdrawn: the dent stays", 2.5, plastic_body, plastic},
+      {"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear},
+      {"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
+       user_constraint_body, user_constraint},
+      {"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6, nullptr,
+       nullptr, potential_field}};
   return list;
 }
 
@@ -26,8 +35,9 @@ Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Ma
   Material material = by_default;
   if (options.young) material.young = *options.young;
   if (options.poisson) material.poisson = *options.poisson;
-  material.check();
-  return {make_elastic_field(mesh.vertices, mesh.tetrahedra, material), material.density * volume(mesh)};
+  const ElasticModel model = options.model.value_or(ElasticModel::springs_volumes);
+  material.check(model);
+  return {make_elastic_field(mesh.vertices, mesh.tetrahedra, material, model), material.density * volume(mesh)};
 }
 
 StepOptions step_options(const SceneOptions& options, StepOptions by_default) {

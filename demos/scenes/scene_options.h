@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "penalty/energy/material.h"
 #include "penalty/math/types.h"
 
 namespace penalty::demo {
@@ -19,6 +20,7 @@ enum class Start { rest, squash, plane, line, point, mirror, scramble };
 /// Throw std::invalid_argument that names the choices.
 WorldKind world_from_name(std::string_view name);
 Start start_from_name(std::string_view name);
+ElasticModel model_from_name(std::string_view name);
 std::string_view name_of(WorldKind world);
 std::string_view name_of(Start start);
 
@@ -30,9 +32,10 @@ struct SceneOptions {
   std::optional<Real> stiffness{};  // K of every constraint [J], with a mass of 1 kg
   std::optional<Real> young{};      // [Pa], with the mass that follows from the density
   std::optional<Real> poisson{};
-  std::optional<Real> damping{};  // ratio of damping to stiffness [s]
-  std::optional<Real> drag{};     // [1/s]
-  std::optional<int> substeps{};  // in a step; empty: from the stability limit
+  std::optional<ElasticModel> model{};  // of bodies made of tetrahedra
+  std::optional<Real> damping{};        // ratio of damping to stiffness [s]
+  std::optional<Real> drag{};           // [1/s]
+  std::optional<int> substeps{};        // in a step; empty: from the stability limit
   std::optional<int> spheres{};
   Start start = Start::rest;
   std::uint32_t seed = 1;

@@ -1,5 +1,6 @@
 // A scene before it enters a Bullet world: plain data.
 #pragma once
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,23 +8,21 @@
 #include "penalty/assembly/potential_field.h"
 #include "penalty/solvers/explicit_step.h"
 #include "scenes/body_mesh.h"
+#include "scenes/figure.h"
+#include "scenes/rigid_object.h"
 
 namespace penalty::demo {
-
-struct Ball {
-  Vector3 position;  // [m]
-  Real radius;       // [m]
-  Real mass;         // [kg]
-};
 
 /// From where it is drawn, and which moment makes the still.
 struct Look {
   Real azimuth = 28, elevation = 14;  // [degrees]
   Real still_time = -1;               // [s]; negative: the end
+  bool wire = true;                   // the edges of the triangles, but for an embedded surface
 };
 
 struct SceneSetup {
   std::string name;
+  std::string title;  // of pictures
   BodyMesh body;
   PotentialField field;
   Real mass = 1;                           // of the soft body, the same for every vertex [kg]
@@ -31,17 +30,28 @@ struct SceneSetup {
   std::vector<int> pinned;                 // vertices that nothing moves
   Vector3 gravity = Vector3::Zero();       // [m/s²]
   bool ground = false;                     // a static box whose top is y = 0
-  std::vector<Ball> balls;                 // rigid and free
+  std::vector<RigidObject> objects;
   StepOptions step;
   std::vector<int> tip;  // vertices whose mean drop is followed
   Look look;
+  /// Called before each world step with the time at its start [s]: what changes about the elements in the course of the
+  /// scene. Empty: nothing does. Before `control_start` it is not called, since looking for changes wakes the body.
+  std::function<void(PotentialField& field, Real time)> control = {};
+  Real control_start = 0;  // [s]
+  bool sleeps = false;     // at rest the world may stop stepping the body; the deformable world then does
+  /// Called after each world step with the time at its end [s]: what has to be seen as it happens. Empty: nothing has.
+  std::function<void(const Positions& x, const PotentialField& field, Real time)> watch = {};
+  /// What the summary says of this scene alone, from positions and field at the end. Empty: nothing.
+  std::function<std::vector<Fact>(const Positions& x, const PotentialField& field)> facts = {};
 };
 
+/// A scene is stepped, or, if it has a `figure`, only drawn; then it has no body and no setup.
 struct SceneEntry {
   std::string_view name, description;
-  Real duration;                          // unless the user says otherwise [s]
+  Real duration;  // of the run, or of the clip that goes round the figure, unless the user says otherwise [s]
   BodyMesh (*body)(const SceneOptions&);  // may take a second; does not depend on the seed
   SceneSetup (*setup)(const SceneOptions&, const BodyMesh&);
+  std::vector<Figure> (*figures)(const SceneOptions&) = nullptr;
 };
 
 const std::vector<SceneEntry>& scenes();
@@ -56,8 +66,22 @@ BodyMesh beam_body(const SceneOptions& options);
 SceneSetup beam(const SceneOptions& options, const BodyMesh& body);
 BodyMesh flight_body(const SceneOptions& options);
 SceneSetup flight(const SceneOptions& options, const BodyMesh& body);
+BodyMesh cloth_body(const SceneOptions& options);
+SceneSetup cloth(const SceneOptions& options, const BodyMesh& body);
+BodyMesh balloon_body(const SceneOptions& options);
+SceneSetup balloon(const SceneOptions& options, const BodyMesh& body);
+BodyMesh muscle_body(const SceneOptions& options);
+SceneSetup muscle(const SceneOptions& options, const BodyMesh& body);
+BodyMesh plastic_body(const SceneOptions& options);
+SceneSetup plastic(const SceneOptions& options, const BodyMesh& body);
+BodyMesh tear_body(const SceneOptions& options);
+SceneSetup tear(const SceneOptions& options, const BodyMesh& body);
+BodyMesh user_constraint_body(const SceneOptions& options);
+SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body);
+std::vector<Figure> potential_field(const SceneOptions& options);
 
-/// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material.
+/// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
+/// it.
 struct Elasticity {
   PotentialField field;
   Real mass;  // [kg]

@@ -7,10 +7,11 @@
 
 namespace penalty::demo {
 
-ShapeMeasure::ShapeMeasure(const Eigen::Matrix3Xd& rest, std::span<const Tetrahedron> tetrahedra)
+ShapeMeasure::ShapeMeasure(const Eigen::Matrix3Xd& rest, std::vector<Edge> edges,
+                           std::span<const Tetrahedron> tetrahedra)
     : rest_(rest),
       tetrahedra_(tetrahedra.begin(), tetrahedra.end()),
-      edges_(edges_of(tetrahedra)),
+      edges_(std::move(edges)),
       volumes_(signed_volumes(rest, tetrahedra)) {
   for (const auto& [a, b] : edges_) lengths_.push_back((rest.col(b) - rest.col(a)).norm());
 }
@@ -26,6 +27,7 @@ ShapeErrors ShapeMeasure::errors(const Positions& x) const {
     errors.length_mean += error / static_cast<Real>(edges_.size());
     worst(errors.length_max, error);
   }
+  if (tetrahedra_.empty()) errors.volume_mean = errors.volume_max = std::numeric_limits<Real>::quiet_NaN();
   for (std::size_t t = 0; t < tetrahedra_.size(); ++t) {
     const auto corner = [&](int k) -> Vector3 { return x.col(tetrahedra_[t][k]).head<3>(); };
     const Vector3 origin = corner(0);

@@ -9,21 +9,21 @@ namespace penalty::demo {
 
 struct ShapeErrors {
   Real length_mean = 0, length_max = 0;  // |L - L0| / L0 over the edges
-  Real volume_mean = 0, volume_max = 0;  // |V - V0| / V0 over the tetrahedra
+  Real volume_mean = 0, volume_max = 0;  // |V - V0| / V0 over the tetrahedra; NaN without any
   int inverted = 0;                      // tetrahedra of volume zero or less
 };
 
 class ShapeMeasure {
  public:
-  ShapeMeasure(const Eigen::Matrix3Xd& rest, std::span<const Tetrahedron> tetrahedra);
+  ShapeMeasure(const Eigen::Matrix3Xd& rest, std::span<const Tetrahedron> tetrahedra)
+      : ShapeMeasure(rest, edges_of(tetrahedra), tetrahedra) {}
+  ShapeMeasure(const Eigen::Matrix3Xd& rest, std::vector<Edge> edges, std::span<const Tetrahedron> tetrahedra = {});
 
   ShapeErrors errors(const Positions& x) const;
 
   /// Largest distance of a vertex to the rest shape after the best rotation and translation (least squares, never a
   /// reflection), over the diagonal of the rest bounding box.
   Real rest_error(const Positions& x) const;
-
-  std::size_t num_edges() const { return edges_.size(); }
 
  private:
   Eigen::Matrix3Xd rest_;

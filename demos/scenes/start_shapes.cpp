@@ -18,6 +18,11 @@ constexpr std::array<std::pair<std::string_view, Start>, 7> starts{{{"rest", Sta
 constexpr std::array<std::pair<std::string_view, WorldKind>, 2> worlds{
     {{"classic", WorldKind::classic}, {"deformable", WorldKind::deformable}}};
 
+constexpr std::array<std::pair<std::string_view, ElasticModel>, 3> models{
+    {{"springs", ElasticModel::springs_volumes},
+     {"springs+areas", ElasticModel::springs_areas_volumes},
+     {"neo-hookean", ElasticModel::neo_hookean}}};
+
 template <class Table>
 auto look_up(const Table& table, std::string_view what, std::string_view name) {
   std::string choices;
@@ -40,6 +45,7 @@ std::string_view name_in(const Table& table, Value value) {
 
 WorldKind world_from_name(std::string_view name) { return look_up(worlds, "world", name); }
 Start start_from_name(std::string_view name) { return look_up(starts, "start", name); }
+ElasticModel model_from_name(std::string_view name) { return look_up(models, "model", name); }
 std::string_view name_of(WorldKind world) { return name_in(worlds, world); }
 std::string_view name_of(Start start) { return name_in(starts, start); }
 

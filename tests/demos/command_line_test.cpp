@@ -28,6 +28,7 @@ TEST(CommandLine, RefusesWhatItDoesNotKnow) {
         Misuse{"run drop --integrator rk4", "auto, explicit, implicit"},
         Misuse{"run drop --integrator implicit", "explicit step only"}, Misuse{"run drop --start upside", "scramble"},
         Misuse{"run drop --gl vulkan", "osmesa"}, Misuse{"run drop --quality ultra", "preview"},
+        Misuse{"run drop --model clay", "springs, springs+areas, neo-hookean"},
         Misuse{"run drop --color grey", "strain"}, Misuse{"run drop --mesh dragon", "dragon"},
         Misuse{"list all", "all"}}) {
     SCOPED_TRACE(misuse.arguments);
@@ -66,6 +67,15 @@ TEST(CommandLine, RefusesImpossibleNumbers) {
                    misuse.mentions);
   }
   expect_refusal(run_demo(words("run beam --cells 17")), "multiple of 4");
+  expect_refusal(run_demo(words("run cloth --poisson 0.3")), "--poisson");
+  expect_refusal(run_demo(words("run cloth --mesh bunny")), "--mesh");
+  expect_refusal(run_demo(words("run cloth --spheres 2")), "--spheres");
+  expect_refusal(run_demo(words("run potential_field --cells 1")), "--cells");
+  expect_refusal(run_demo(words("run tear --model springs")), "--model");
+  expect_refusal(run_demo(words("run balloon --stiffness 1")), "--stiffness");
+  expect_refusal(run_demo(words("run plastic --start squash")), "rest");
+  expect_refusal(run_demo(words("run beam --model neo-hookean --stiffness 1")), "excludes");
+  expect_refusal(run_demo(words("run beam --model springs+areas --poisson 0.26")), "oisson");
 }
 
 TEST(CommandLine, RefusesPlacesThatCannotBeWritten) {
@@ -118,15 +128,17 @@ TEST(CommandLine, ListsTheScenes) {
   const Outcome outcome = run_demo({"list"});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.errors, "");
-  for (const char* scene : {"drop", "beam", "flight"}) EXPECT_NE(outcome.output.find(scene), std::string::npos);
+  for (const char* scene : {"drop", "beam", "flight", "cloth", "balloon", "muscle", "plastic", "tear",
+                            "user_constraint", "potential_field"})
+    EXPECT_NE(outcome.output.find(scene), std::string::npos);
 }
 
 TEST(CommandLine, ExplainsItself) {
   const Outcome outcome = run_demo({"run", "--help"});
   EXPECT_EQ(outcome.status, 0);
   for (const char* option :
-       {"--world", "--integrator", "--mesh", "--stiffness", "--young", "--poisson", "--start", "--seed", "--seeds",
-        "--rate", "--duration", "--out", "--quality", "--gl", "--no-render", "--summary"})
+       {"--world", "--integrator", "--mesh", "--stiffness", "--model", "--young", "--poisson", "--start", "--seed",
+        "--seeds", "--rate", "--duration", "--out", "--quality", "--gl", "--no-render", "--summary"})
     EXPECT_NE(outcome.output.find(option), std::string::npos) << option;
 }
 

@@ -45,7 +45,7 @@ TEST(Summary, HasThePromisedKeys) {
     EXPECT_TRUE(summary[key].is_number()) << key;
   for (const char* key : {"finite", "recovered"}) EXPECT_TRUE(summary[key].is_boolean()) << key;
   EXPECT_TRUE(summary["mesh"]["source"].is_string());
-  for (const char* key : {"vertices", "tetrahedra", "edges"})
+  for (const char* key : {"vertices", "tetrahedra", "triangles", "edges"})
     EXPECT_TRUE(summary["mesh"][key].is_number_integer()) << key;
   for (const char* key : {"median", "max"}) EXPECT_GT(summary["ms_per_step"][key], 0) << key;
   for (const char* key : {"initial", "peak", "final"}) EXPECT_TRUE(summary["energy"][key].is_number()) << key;
@@ -61,6 +61,49 @@ TEST(Summary, HasThePromisedKeys) {
   EXPECT_EQ(summary["steps"], 12);
   EXPECT_EQ(summary["mesh"]["tetrahedra"], 5 * 4 * 4 * 4);
   EXPECT_EQ(summary["finite"], true);
+}
+
+TEST(Summary, OfAShellHasNoVolumes) {
+  const Json summary = summary_of("run cloth --cells 8 --duration 0.2");
+  EXPECT_EQ(summary["mesh"]["tetrahedra"], 0);
+  EXPECT_EQ(summary["mesh"]["triangles"], 128);
+  EXPECT_EQ(summary["mesh"]["vertices"], 81);
+  EXPECT_EQ(summary["mesh"]["edges"], 81 + 128 - 1);
+  EXPECT_TRUE(summary["volume_error"]["mean"].is_null());
+  EXPECT_TRUE(summary["volume_error"]["max"].is_null());
+  EXPECT_TRUE(summary["length_error"]["mean"].is_number());
+  EXPECT_EQ(summary["inverted"], 0);
+  EXPECT_TRUE(summary["sag"].is_number());
+  EXPECT_FALSE(summary.contains("tip_drop"));
+  EXPECT_EQ(summary["finite"], true);
+}
+
+TEST(Summary, HasTheLedgerOfTheRun) {
+  const Json ledger = summary_of("run tear --cells 8 --duration 1")["ledger"];
+  ASSERT_EQ(ledger["batches"].size(), 1u);
+  const Json& springs = ledger["batches"][0];
+  EXPECT_EQ(springs["name"], "length");
+  EXPECT_LT(springs["enabled"], springs["elements"]);
+  for (const char* key : {"mean", "max"}) EXPECT_TRUE(springs["strain"][key].is_number()) << key;
+  for (const char* key : {"constant_forces", "contacts", "couplings", "driving", "changes", "damping", "drag",
+                          "inelastic", "contact_loss"})
+    EXPECT_TRUE(ledger["flows"][key].is_number()) << key;
+  EXPECT_GT(ledger["flows"]["driving"], 0);
+  EXPECT_GT(ledger["flows"]["inelastic"], 0);
+  EXPECT_LT(ledger["residual"], 0.01);
+}
+
+TEST(Summary, OfAFigureHasTheSameKeysAndItsFacts) {
+  const Json run = summary_of("run flight --mesh box --cells 2 --duration 0.1");
+  const Json summary = summary_of("run potential_field --cells 16");
+  for (const char* key :
+       {"scene", "world", "integrator", "precision", "mesh", "seed", "dt", "steps", "ms_per_step", "energy",
+        "rest_error", "length_error", "volume_error", "inverted", "momentum", "finite", "recovered"}) {
+    EXPECT_TRUE(run.contains(key)) << key;
+    EXPECT_TRUE(summary.contains(key)) << key;
+  }
+  EXPECT_EQ(summary["finite"], true);
+  EXPECT_LT(summary["largest_volume_force_error"], 1e-12);
 }
 
 TEST(Summary, NamesTheWorld) {
@@ -107,6 +150,11 @@ TEST(Outputs, DataNeedsNoOpenGL) {
   const std::string csv = contents(directory / "new/place/energies.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 1 + 30);  // names, start, steps
   EXPECT_TRUE(csv.starts_with("time,elastic,kinetic,")) << csv.substr(0, 80);
+  const std::string names = csv.substr(0, csv.find('\n')), first = csv.substr(names.size() + 1);
+  for (const char* name : {",damping,", ",contact_loss,", ",length_energy,", ",tetrahedron_volume_strain_max"})
+    EXPECT_NE(names.find(name), std::string::npos) << name;
+  EXPECT_EQ(std::count(names.begin(), names.end(), ','),
+            std::count(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(first.find('\n')), ','));
   EXPECT_NE(contents(directory / "new/place/energies.svg").find("<svg"), std::string::npos);
 }
 
@@ -130,6 +178,17 @@ TEST(Outputs, PicturesShowTheScene) {
   } else {  // without ffmpeg its frames
     EXPECT_NE(outcome.errors.find("ffmpeg"), std::string::npos) << outcome.errors;
   }
+}
+
+TEST(Outputs, AFigureLeavesAStillOfEachAndAClip) {
+  const TemporaryDirectory directory;
+  const Outcome outcome =
+      run_demo({"run", "potential_field", "--cells", "16", "--duration", "0.2", "--out", directory.path().string()},
+               "LP_NUM_THREADS=1");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  for (const char* name : {"potential_field.png", "volume_force.png"})
+    EXPECT_EQ(read_png(directory / name).width, 640u) << name;
+  EXPECT_TRUE(std::filesystem::exists(directory / "summary.json"));
 }
 
 TEST(Outputs, WithoutFfmpegTheFramesAreKept) {

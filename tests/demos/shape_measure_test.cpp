@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "penalty/mesh/builders.h"
+#include "penalty/mesh/surface_builders.h"
 
 namespace penalty::demo {
 namespace {
@@ -46,6 +47,19 @@ TEST(ShapeMeasure, ShowsNotANumber) {
   EXPECT_TRUE(std::isnan(shape.measure.rest_error(broken)));
   EXPECT_TRUE(std::isnan(shape.measure.errors(broken).volume_mean));
   EXPECT_GT(shape.measure.errors(broken).inverted, 0);
+}
+
+TEST(ShapeMeasure, ASheetHasLengthsButNoVolumes) {
+  const TriangleSurface sheet = make_sheet(2, 1, 4, 2);
+  const ShapeMeasure measure(sheet.vertices, edges_of(sheet.triangles));
+  const ShapeErrors errors = measure.errors(pack(1.1 * sheet.vertices));
+  EXPECT_NEAR(errors.length_mean, 0.1, 1e-13);
+  EXPECT_NEAR(errors.length_max, 0.1, 1e-13);
+  EXPECT_TRUE(std::isnan(errors.volume_mean));
+  EXPECT_TRUE(std::isnan(errors.volume_max));
+  EXPECT_EQ(errors.inverted, 0);
+  const Matrix3 rotation = Eigen::AngleAxisd(2.1, Vector3(1, -2, 0.5).normalized()).toRotationMatrix();
+  EXPECT_LT(measure.rest_error(pack(rotation * sheet.vertices)), 1e-14) << "flat, and yet there is a best rotation";
 }
 
 }  // namespace

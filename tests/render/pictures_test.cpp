@@ -70,7 +70,9 @@ TEST_P(Pictures, RigidShapesAreWhereTheyShouldBe) {
                                 {"capsule", Capsule{0.2, 0.5}, at({0.5, 0.2, 0}), {0.2, 0.7}},
                                 {"lying capsule", Capsule{0.2, 0.5}, tilted, {0.7, 0.2}},
                                 {"cylinder", Cylinder{0.3, 0.5}, at({0, 0.1, 0}), {0.3, 0.5}},
-                                {"lying cylinder", Cylinder{0.3, 0.5}, tilted, {0.5, 0.3}}};
+                                {"lying cylinder", Cylinder{0.3, 0.5}, tilted, {0.5, 0.3}},
+                                {"cone", Cone{0.4}, at({0, 0.1, 0}), {0.4, 0.52}},
+                                {"lying cone", Cone{0.4}, tilted, {0.52, 0.4}}};
   for (const Case& c : cases) {
     frame.bodies = {{.shape = c.shape, .transform = c.transform, .color = palette(1)}};
     const Region seen(renderer.render(frame), empty);

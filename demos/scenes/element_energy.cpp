@@ -1,0 +1,78 @@
+#include "scenes/element_energy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace penalty::demo {
+namespace {
+
+using OtherKinds = KindList<Attachment, EnclosedVolume, ShapeMatch, StableNeoHookean>;
+
+/// Calls visit(batch) for every batch of one of the kinds.
+template <class... Kinds, class Visit>
+void for_each_batch(KindList<Kinds...>, const PotentialField& field, const Visit& visit) {
+  for (const auto& potential : field.potentials()) {
+    if (const auto* nested = dynamic_cast<const PotentialField*>(potential.get()))
+      for_each_batch(KindList<Kinds...>(), *nested, visit);
+    const auto visit_kind = [&]<class Kind>(const Batch<Kind>* batch) {
+      if (batch) visit(*batch);
+    };
+    (visit_kind(dynamic_cast<const Batch<Kinds>*>(potential.get())), ...);
+  }
+}
+
+}  // namespace
+
+Eigen::VectorXd particle_energies(const PotentialField& field, const Positions& x) {
+  Eigen::VectorXd energies = Eigen::VectorXd::Zero(field.num_particles());
+  const auto add = [&]<class Kind>(const Batch<Kind>& batch) {
+    std::vector<Real> element_energies;
+    batch.append_energies(x, element_energies);
+    for (std::size_t e = 0; e < element_energies.size(); ++e)
+      for (int i : batch.stencils()[e])
+        energies[i] += element_energies[e] / static_cast<Real>(batch.stencils()[e].size());
+  };
+  for_each_batch(AllKinds(), field, add);
+  for_each_batch(OtherKinds(), field, add);
+  return energies;
+}
+
+Eigen::VectorXd particle_strains(const PotentialField& field, const Positions& x) {
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(field.num_particles()), counts = sums;
+  for_each_batch(KindList<Length>(), field, [&](const Batch<Length>& batch) {
+    std::vector<Real> strains;
+    batch.append_strains(x, strains);
+    for (std::size_t e = 0; e < strains.size(); ++e)
+      for (int i : batch.stencils()[e]) {
+        sums[i] += std::abs(strains[e]);
+        counts[i] += 1;
+      }
+  });
+  return (counts.array() > 0).select(sums.array() / counts.array(), 0);
+}
+
+std::vector<Triangle> unbroken_triangles(const BodyMesh& body, const PotentialField& field) {
+  std::set<Edge> broken;
+  for_each_batch(KindList<Length>(), field, [&](const Batch<Length>& batch) {
+    for (const Break& b : batch.breaks())
+      if (!batch.is_enabled(b.element)) broken.insert(batch.stencils()[b.element]);
+  });
+  if (broken.empty() || body.surface) return {};
+  const auto has_broken_edge = [&broken](const auto& element) {
+    for (std::size_t i = 0; i < element.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (broken.contains({std::min(element[i], element[j]), std::max(element[i], element[j])})) return true;
+    return false;
+  };
+  if (body.is_shell()) {
+    std::vector<Triangle> triangles = body.shell().triangles;
+    std::erase_if(triangles, has_broken_edge);
+    return triangles;
+  }
+  std::vector<Tetrahedron> tetrahedra = body.solid().tetrahedra;
+  std::erase_if(tetrahedra, has_broken_edge);
+  return boundary_faces(tetrahedra);
+}
+
+}  // namespace penalty::demo

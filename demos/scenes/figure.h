@@ -1,0 +1,24 @@
+// A picture of the potentials themselves: nothing moves in it.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "render/picture.h"
+
+namespace penalty::demo {
+
+/// A measured number that the summary gives under this name.
+struct Fact {
+  std::string name;
+  double value;
+};
+
+struct Figure {
+  std::string name = {};     // of the file
+  render::Frame frame = {};  // but for its camera
+  render::Overlay overlay = {};
+  render::View view = {};
+  std::vector<Fact> facts = {};
+};
+
+}  // namespace penalty::demo
