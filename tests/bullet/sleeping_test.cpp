@@ -157,7 +157,7 @@ TEST_P(SleepingTied, ABodyThatIsSwitchedOffIsNoError) {
 
 INSTANTIATE_TEST_SUITE_P(World, SleepingTied, deformable_world(), param_name);
 
-// A weight on a soft rope swings slowly enough for Bullet to think that it rests.
+// A weight on a rope swings slowly enough for Bullet to think that it rests, but hangs on a body that is awake.
 class SlowPendulum : public WorldTest {};
 
 TEST_P(SlowPendulum, SwingsOn) {
@@ -165,7 +165,6 @@ TEST_P(SlowPendulum, SwingsOn) {
   btSoftBody& post = sim.add_jelly(make_box({0.2, 0.2, 0.2}, {1, 1, 1}), {.body = {.pinned = {0, 1, 2, 3, 4, 5, 6, 7}}});
   btRigidBody& weight = sim.add_box({0.05, 0.05, 0.05}, 1, {0.15, -1.5, 0});
   let_sleep(weight);
-  let_sleep(post);
   const Vector3 top = to_vector(post.m_nodes[0].m_x);
   Eigen::Matrix3Xd rest(3, 2);
   rest << top, Vector3(0.15, -1.5, 0);

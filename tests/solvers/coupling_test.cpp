@@ -189,39 +189,35 @@ TEST(Coupling, AWeightThatHangsOnANodeAtRestDoesNoWork) {
   field.add<Length>(std::vector<Edge>{{0, 1}, {0, 2}}, 1000);
   Coupling coupling = make_coupling(field, {{.body = 0, .particle = 0}, {.rigid_body = 0}, {.rigid_body = 1}});
   coupling.damping_time = 0.02;
-  for (int step = 0; step < 600; ++step) advance({&body.body}, bodies, coupling, field, 1.0 / 60);
+  for (int step = 0; step < 6000; ++step) advance({&body.body}, bodies, coupling, field, 1.0 / 60);
   const Real before = body.body.flows.couplings;
   for (int step = 0; step < 60; ++step) advance({&body.body}, bodies, coupling, field, 1.0 / 60);
   EXPECT_LT(bodies[1].velocity.norm(), 1e-6);
   EXPECT_NEAR(body.body.flows.couplings, before, 1e-6);
 }
 
-TEST(Coupling, RopesThatTurnParallelNeedNoRetries) {
-  // At right angles at rest, pulling together later: the bound must not depend on directions.
-  Eigen::Matrix3Xd rest(3, 1);
-  rest << Vector3(0, 0, 0);
-  Body body = make_free_particles(rest, {1});
+TEST(Coupling, BoundOfTheEigenvalueHoldsHoweverTheBodiesTurn) {
+  // Three ropes at right angles when at rest; later they may pull together.
+  Body body = make_free_particles(Eigen::Matrix3Xd::Zero(3, 1), {1});
   RigidBody hooks[3];
-  Eigen::Matrix3Xd points(3, 4);
-  points.col(0).setZero();
+  Eigen::Matrix3Xd points = Eigen::Matrix3Xd::Zero(3, 4);
   std::vector<CoupledPoint> coupled{{.body = 0, .particle = 0}};
   std::vector<Edge> ropes;
   for (int k = 0; k < 3; ++k) {
     points.col(k + 1) = Vector3::Unit(k);
-    hooks[k].position = {1, 0.001 * k, 0};
     coupled.push_back({.rigid_body = k});
     ropes.push_back({0, k + 1});
   }
   PotentialField field(points);
   field.add<Length>(ropes, 1e4);
   Coupling coupling = make_coupling(field, std::move(coupled));
-  body.set_velocity(0, {-1, 0, 0});
-  int retries = 0;
-  for (int step = 0; step < 120; ++step) {
-    advance({&body.body}, hooks, coupling, field, 1.0 / 60);
-    retries += body.body.report.retries;
-  }
-  EXPECT_EQ(retries, 0);
+  SteppedBody* bodies[] = {&body.body};
+  estimate_stability(coupling, bodies, hooks, field.rest_positions(), false);
+  PackedVectors parallel = field.rest_positions();
+  for (int k = 1; k < 4; ++k) parallel.col(k).head<3>() = Vector3::UnitX();
+  const Real largest = true_largest_eigenvalue(field, parallel, {1, 0, 0, 0});
+  EXPECT_NEAR(largest, 3e4, 1e-6);
+  EXPECT_GE(coupling.largest_eigenvalue, largest);
 }
 
 TEST(Coupling, ObstaclesThatMoveDoWork) {
@@ -245,8 +241,9 @@ TEST(Coupling, ObstaclesThatMoveDoWork) {
   }
   EXPECT_EQ(bodies[0].velocity, Vector3(2, 0, 0));
   EXPECT_NEAR(bodies[0].position.x(), 11, 1e-9);
-  EXPECT_GT(body.position(0).x(), 9);
-  EXPECT_LT(body.position(0).x(), 10.5);
+  // The rope of 1 m is elastic and damps only while it is taut: the particle swings about the hand.
+  EXPECT_NEAR(body.position(0).x(), 11, 1.3);
+  EXPECT_LT(std::abs(body.velocity(0).x()), 4.1);
 }
 
 }  // namespace
