@@ -142,10 +142,10 @@ class Batch final : public ElementBatch {
 
   bool is_off(std::size_t e) const { return !(stiffnesses_[e] > 0); }
 
-  void gather(std::size_t e, const Positions& x, Points<num_points>& points) const {
+  [[gnu::always_inline]] void gather(std::size_t e, const Positions& x, Points<num_points>& points) const {
     gather_points(stencils_[e], x.data(), points);
   }
-  void scatter(std::size_t e, const Gradient<num_points>& values, Real scale, Forces& f) const {
+  [[gnu::always_inline]] void scatter(std::size_t e, const Gradient<num_points>& values, Real scale, Forces& f) const {
     scatter_points(stencils_[e], values, scale, f.data());
   }
 

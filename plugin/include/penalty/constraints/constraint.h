@@ -45,8 +45,8 @@ concept ElasticEnergy = requires(const Kind e, const Points<Kind::num_points>& p
 
 /// C and dC/dp at once; `gradient` is overwritten.
 template <Constraint Kind>
-Real value_and_gradient(const Kind& kind, const Points<Kind::num_points>& points,
-                        Gradient<Kind::num_points>& gradient) {
+[[gnu::always_inline]] inline Real value_and_gradient(const Kind& kind, const Points<Kind::num_points>& points,
+                                                      Gradient<Kind::num_points>& gradient) {
   if constexpr (HasValueAndGradient<Kind>) {
     return kind.value_and_gradient(points, gradient);
   } else {

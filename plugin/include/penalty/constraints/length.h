@@ -36,7 +36,7 @@ struct Length {
     return g;
   }
 
-  Real value_and_gradient(const Points<2>& p, Gradient<2>& g) const {
+  [[gnu::always_inline]] Real value_and_gradient(const Points<2>& p, Gradient<2>& g) const {
     Triple direction = Triple::column(p, 1) - Triple::column(p, 0);
     const Real length = std::sqrt(dot(direction, direction));
     const Real ratio = length * inverse_rest_length;

@@ -48,7 +48,7 @@ struct TriangleArea {
     return g;
   }
 
-  Real value_and_gradient(const Points<3>& p, Gradient<3>& g) const {
+  [[gnu::always_inline]] Real value_and_gradient(const Points<3>& p, Gradient<3>& g) const {
     const Triple p0 = Triple::column(p, 0);
     const Triple u = Triple::column(p, 1) - p0, v = Triple::column(p, 2) - p0;
     Triple normal = cross(u, v);

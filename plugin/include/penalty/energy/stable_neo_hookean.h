@@ -63,7 +63,7 @@ struct StableNeoHookean {
     return psi(s);
   }
 
-  Real energy_and_gradient(const Points<4>& p, Gradient<4>& g) const {
+  [[gnu::always_inline]] Real energy_and_gradient(const Points<4>& p, Gradient<4>& g) const {
     const State s(*this, p);
     const Real stretch = shear * (1 - s.inverse), swell = bulk() * s.dilation - 1;  // l (J - alpha)
     const Triple p0 = s.f[0] * stretch + s.cofactor[0] * swell;
@@ -157,7 +157,7 @@ struct StableNeoHookean {
     Triple f[3], cofactor[3];
     Real invariant, inverse, dilation;  // I, 1 / (I + 1), J - 1
 
-    State(const StableNeoHookean& element, const Points<4>& p) {
+    [[gnu::always_inline]] State(const StableNeoHookean& element, const Points<4>& p) {
       const Matrix3& rest = element.inverse_rest;
       const Triple p0 = Triple::column(p, 0);
       const Triple a = Triple::column(p, 1) - p0, b = Triple::column(p, 2) - p0, c = Triple::column(p, 3) - p0;
@@ -173,7 +173,7 @@ struct StableNeoHookean {
 
   // psi with H = F - 1, so that the terms that are large near rest cancel on paper and not in floating point: with
   // y = (I - 3)/4 it is |H|²/2 - (sum of the principal 2 x 2 minors of H) - det H + m/2 (y - ln(1 + y)) + l/2 (J - 1)².
-  Real psi(const State& s) const {
+  [[gnu::always_inline]] Real psi(const State& s) const {
     const Real xx = s.f[0].x - 1, yx = s.f[0].y, zx = s.f[0].z;
     const Real xy = s.f[1].x, yy = s.f[1].y - 1, zy = s.f[1].z;
     const Real xz = s.f[2].x, yz = s.f[2].y, zz = s.f[2].z - 1;
