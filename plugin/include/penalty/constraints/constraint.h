@@ -33,6 +33,13 @@ concept HasValueAndGradient =
       { c.value_and_gradient(p, g) } -> std::same_as<Real>;
     };
 
+/// A kind may give the positive semidefinite matrix nearest to dC dCᵀ + strain d²C, where it has a quicker way to it than
+/// the eigenvectors of the Hessian.
+template <class Kind>
+concept HasProjectedStiffness = Constraint<Kind> && requires(const Kind c, const Points<Kind::num_points>& p) {
+  { c.projected_stiffness(p, Real()) } -> std::convertible_to<Hessian<Kind::num_points>>;
+};
+
 /// A kind that is an energy itself, not the square of a constraint: E = K psi(p) with psi dimensionless, zero at rest and
 /// nowhere less, and K in joules as for constraints. `energy_and_gradient` overwrites its second argument with dpsi/dp.
 template <class Kind>
@@ -41,6 +48,13 @@ concept ElasticEnergy = requires(const Kind e, const Points<Kind::num_points>& p
   { e.energy(p) } -> std::same_as<Real>;
   { e.energy_and_gradient(p, g) } -> std::same_as<Real>;
   { e.energy_hessian(p) } -> std::convertible_to<Hessian<Kind::num_points>>;
+};
+
+/// An energy may give a positive semidefinite matrix of its own that stands for d²psi/dp²: no less than that, and equal
+/// to it where it is positive semidefinite itself.
+template <class Kind>
+concept HasProjectedHessian = ElasticEnergy<Kind> && requires(const Kind e, const Points<Kind::num_points>& p) {
+  { e.projected_hessian(p) } -> std::convertible_to<Hessian<Kind::num_points>>;
 };
 
 /// C and dC/dp at once; `gradient` is overwritten.

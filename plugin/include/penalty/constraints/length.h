@@ -63,6 +63,32 @@ struct Length {
     return h;
   }
 
+  /// [[X, -X], [-X, X]] with X = n nᵀ / L0² + strain B: B is across n, so X has eigenvalues 1 / L0² once and
+  /// strain / (|p1 - p0| L0) twice, of which only the latter can be negative.
+  Hessian<2> projected_stiffness(const Points<2>& p, Real strain) const {
+    Triple n = Triple::column(p, 1) - Triple::column(p, 0);
+    const Real length = std::sqrt(dot(n, n));
+    Real across = 0;
+    if (length * inverse_rest_length > smallest_ratio) {
+      const Real inverse = 1 / length;
+      n = n * inverse;
+      if (strain > 0) across = strain * inverse * inverse_rest_length;
+    } else {
+      n = {rest_direction[0], rest_direction[1], rest_direction[2]};
+    }
+    const Triple along = n * (inverse_rest_length * inverse_rest_length - across);
+    const Real xx = along.x * n.x + across, yy = along.y * n.y + across, zz = along.z * n.z + across;
+    const Real xy = along.x * n.y, yz = along.y * n.z, zx = along.z * n.x;
+    Hessian<2> k;
+    k << xx, xy, zx, -xx, -xy, -zx,  //
+        xy, yy, yz, -xy, -yy, -yz,   //
+        zx, yz, zz, -zx, -yz, -zz,   //
+        -xx, -xy, -zx, xx, xy, zx,   //
+        -xy, -yy, -yz, xy, yy, yz,   //
+        -zx, -yz, -zz, zx, yz, zz;
+    return k;
+  }
+
   static constexpr Real smallest_ratio = 1e-9;  // of the rest length: below it the points coincide
   Real inverse_rest_length;                     // 1 / L0 [1/m]
   Eigen::Vector3f rest_direction;               // n at rest: only a direction, so single precision is enough

@@ -1,6 +1,7 @@
 // The signed volume of a tetrahedron.
 #pragma once
 #include "penalty/constraints/constraint.h"
+#include "penalty/math/isotropic_projection.h"
 #include "penalty/math/triple.h"
 
 namespace penalty {
@@ -76,6 +77,23 @@ struct TetrahedronVolume {
         a - c, c, zero, -a,          //
         b - a, -b, a, zero;
     return h;
+  }
+
+  /// V = det(Y) / 3 with Y = [p0, p1, p2, p3] Q = [a, b, c] M, the columns of Q orthonormal and across (1, 1, 1, 1) and M
+  /// its last three rows. As Q is orthonormal, the nearest matrix for Y is also the nearest one for p.
+  Hessian<4> projected_stiffness(const Points<4>& p, Real strain) const {
+    const Triple p0 = Triple::column(p, 0);
+    const Triple a = Triple::column(p, 1) - p0, b = Triple::column(p, 2) - p0, c = Triple::column(p, 3) - p0;
+    Matrix3 y, m;
+    ((b + c - a) * 0.5).store(y, 0);
+    ((c + a - b) * 0.5).store(y, 1);
+    ((a + b - c) * 0.5).store(y, 2);
+    m << -0.5, 0.5, 0.5, 0.5, -0.5, 0.5, 0.5, 0.5, -0.5;
+    const Real slope = inverse_rest_volume / 3;  // dC / d det Y
+    const SignedSvd svd = signed_svd(y);
+    auto stiffness = PrincipalStiffness::of({.i = 0, .ii = 0, .j = strain * slope, .jj = slope * slope}, svd.s);
+    stiffness.make_psd();
+    return isotropic_hessian(svd, stiffness, m);
   }
 
   Real inverse_rest_volume;  // 1 / V0, signed [1/m³]
