@@ -16,7 +16,7 @@ concept ElementKind = Constraint<Kind> || ElasticEnergy<Kind>;
 enum class StiffnessModel {
   gauss_newton,   // K dC dCᵀ: positive semidefinite, exact where s = 0; of an energy: psd_projected
   exact,          // K (dC dCᵀ + s d²C): the second derivative of E; indefinite away from rest
-  psd_projected,  // the exact one with its negative eigenvalues set to zero
+  psd_projected,  // the exact one with its negative eigenvalues set to zero; of an energy its `projected_hessian`
   taut,           // gauss_newton, of slack elements too: what the stable step is judged by
 };
 
@@ -69,7 +69,8 @@ Gradient<Kind::num_points> force(const Kind& kind, Real stiffness, const Points<
   return -gradient;
 }
 
-/// d²E/dp² [N/m]. A constraint without a Hessian has its Gauss-Newton stiffness under every model.
+/// d²E/dp² [N/m]. A constraint without a Hessian has its Gauss-Newton stiffness under every model. The projection is
+/// the kind's own closed form, if there is one; that of an energy is for plain profiles only.
 template <ElementKind Kind>
 Hessian<Kind::num_points> stiffness_matrix(const Kind& kind, Real stiffness, const Points<Kind::num_points>& points,
                                            StiffnessModel model, const Profile& profile = {}) {
@@ -77,6 +78,22 @@ Hessian<Kind::num_points> stiffness_matrix(const Kind& kind, Real stiffness, con
   Gradient<Kind::num_points> gradient(3, points.cols());
   Matrix k;
   const bool bare = model == StiffnessModel::gauss_newton || model == StiffnessModel::taut;
+  if constexpr (HasProjectedStiffness<Kind>) {
+    if (model == StiffnessModel::psd_projected) {
+      const Real c = kind.value(points);
+      if (profile.is_slack(c)) return Matrix::Zero(gradient.size(), gradient.size());
+      k = kind.projected_stiffness(points, profile.strain(c));
+      k *= stiffness;
+      return k;
+    }
+  }
+  if constexpr (HasProjectedHessian<Kind>) {
+    if (model == StiffnessModel::taut || (model != StiffnessModel::exact && profile.is_plain())) {
+      k = kind.projected_hessian(points);
+      k *= stiffness;
+      return k;
+    }
+  }
   if constexpr (Constraint<Kind>) {
     const Real c = value_and_gradient(kind, points, gradient);
     if (model != StiffnessModel::taut && profile.is_slack(c)) return Matrix::Zero(gradient.size(), gradient.size());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "penalty/constraints/constraint.h"
+#include "penalty/math/isotropic_projection.h"
 #include "penalty/math/triple.h"
 
 namespace penalty {
@@ -105,6 +106,25 @@ struct StableNeoHookean {
         if (a != b) h.block<3, 3>(3 * b, 3 * a) += block.transpose();
       }
     return h;
+  }
+
+  /// d²psi/dp² with the negative eigenvalues of d²psi/dF² set to zero, as is usual: positive semidefinite, no less than
+  /// d²psi/dp², and equal to it where that is positive semidefinite already. Among such matrices it is not the nearest one
+  /// to d²psi/dp²: that would depend on the shape at rest, and this one depends on the material and F only.
+  ///
+  /// dpsi/dI = m/2 (1 - 1/(I + 1)), d²psi/dI² = m/2 / (I + 1)², dpsi/dJ = l (J - alpha), d²psi/dJ² = l.
+  Hessian<4> projected_hessian(const Points<4>& p) const {
+    const State s(*this, p);
+    Matrix3 f;
+    for (int k = 0; k < 3; ++k) s.f[k].store(f, k);
+    const SignedSvd svd = signed_svd(f);
+    auto stiffness = PrincipalStiffness::of({.i = shear / 2 * (1 - s.inverse),
+                                             .ii = shear / 2 * s.inverse * s.inverse,
+                                             .j = bulk() * s.dilation - 1,
+                                             .jj = bulk()},
+                                            svd.s);
+    stiffness.make_psd();
+    return isotropic_hessian(svd, stiffness, inverse_rest);
   }
 
   /// Calls visit(weight, gradient) for every mode of a viscosity that, with the weights in units of K, averages over
