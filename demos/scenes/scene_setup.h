@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "penalty/assembly/potential_field.h"
-#include "penalty/solvers/explicit_step.h"
+#include "penalty/solvers/step.h"
 #include "scenes/body_mesh.h"
 #include "scenes/figure.h"
 #include "scenes/rigid_object.h"

@@ -5,6 +5,7 @@
 #include "assembly/meshes.h"
 #include "constraints/samples.h"
 #include "penalty/constraints/user_constraint.h"
+#include "penalty/solvers/linear_solver.h"
 
 namespace penalty::testing {
 namespace {
@@ -402,6 +403,33 @@ TEST_P(PotentialProperties, DampingTakesEnergyAndKeepsMomentum) {
   const Real tolerance = kind().has_exact_stiffness ? 1e-12 : 1e-9;
   linear.expect_below(tolerance, "linear momentum");
   angular.expect_below(tolerance, "angular momentum");
+}
+
+TEST_P(PotentialProperties, DampingMatrixTimesVelocityIsMinusTheDampingForce) {
+  WorstError error;
+  int damped = 0;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    PackedVectors f = PackedVectors::Zero(4, s.x.cols());
+    s.field.add_damping_forces(s.x, s.v, 0.1, f);
+    std::vector<std::pair<int, int>> pattern;
+    s.field.append_pattern(pattern);
+    LinearSystem damping{BlockMatrix(static_cast<int>(s.x.cols()), std::move(pattern)), {}, {}};
+    s.field.add_damping(s.x, 0.1, damping.matrix);
+    s.field.append_damping_terms(s.x, 0.1, damping.terms);
+    PackedVectors product(4, s.x.cols());
+    damping.multiply(s.v, product);
+    if (f.norm() > 0) {
+      Real size = damping.matrix.to_dense().norm();
+      for (const RankOneTerm& term : damping.terms) size += std::abs(term.coefficient) * term.direction.squaredNorm();
+      error.see((product + f).norm() / (size * s.v.norm()), seed);
+      ++damped;
+    } else {
+      EXPECT_EQ(product.norm(), 0) << trace(seed);
+    }
+  }
+  EXPECT_GT(damped, static_cast<int>(num_states) / 20);
+  error.expect_below(kind().has_exact_stiffness ? 1e-12 : 1e-9, "damping matrix");
 }
 
 TEST_P(PotentialProperties, EveryAccountOfTheEnergyIsTheSame) {

@@ -56,6 +56,19 @@ TEST(Allocation, DampingDragGravityAndExternalForcesNeedNone) {
   EXPECT_EQ(allocations(beam), 0);
 }
 
+TEST(Allocation, AnImplicitStepNeedsNone) {
+  for (const bool pinned : {false, true}) {
+    Body beam = make_beam_body(1);
+    beam.body.options.integrator = Integrator::implicit_step;
+    beam.body.options.damping_time = 0.01;
+    beam.body.gravity = Vector3(0, -10, 0);
+    beam.body.external_forces = PackedVectors::Ones(4, beam.particles().size());
+    if (pinned) beam.particles().inverse_masses[0] = 0;
+    EXPECT_EQ(allocations(beam), 0);
+    EXPECT_EQ(beam.body.report.integrator, Integrator::implicit_step);
+  }
+}
+
 TEST(Allocation, ARetriedStepNeedsNone) {
   Body beam = make_beam_body(1);
   beam.particles().positions.row(0) *= 4;

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "assembly/meshes.h"
-#include "penalty/solvers/explicit_step.h"
+#include "penalty/solvers/step.h"
 
 namespace penalty::testing {
 

@@ -26,6 +26,10 @@ TEST(StepOptions, NumbersOutOfRangeAreNamed) {
   EXPECT_EQ(refusal({.energy_tolerance = 0}), "step: energy_tolerance is 0, must be positive");
   EXPECT_EQ(refusal({.max_substeps = 0}), "step: max_substeps is 0, must be at least 1");
   EXPECT_EQ(refusal({.contact_slop = -1}), "step: contact_slop is -1, must be zero or positive [m]");
+  EXPECT_EQ(refusal({.newton_iterations = 0}), "step: newton_iterations is 0, must be at least 1");
+  EXPECT_EQ(refusal({.newton_tolerance = 0}), "step: newton_tolerance is 0, must be in (0, 1)");
+  EXPECT_EQ(refusal({.linear = {.max_iterations = 0}}), "step: linear.max_iterations is 0, must be at least 1");
+  EXPECT_EQ(refusal({.linear = {.tolerance = 1}}), "step: linear.tolerance is 1, must be in (0, 1)");
   const Real nan = std::nan(""), inf = std::numeric_limits<Real>::infinity();
   for (const Real bad : {nan, inf}) {
     EXPECT_NE(refusal({.damping_time = bad}).find("damping_time"), std::string::npos);
@@ -42,6 +46,7 @@ TEST(StepOptions, SubstepsAreTakenAsAskedAndNeverBeyondTheMost) {
   advance(beam, 1.0 / 60);
   EXPECT_EQ(beam.body.report.substeps, 37);
   Body stiff = make_beam_body(1, {.young = 1e12, .poisson = 0.4});
+  stiff.body.options.integrator = Integrator::explicit_step;
   stiff.body.options.max_substeps = 10;
   advance(stiff, 1.0 / 60);
   EXPECT_EQ(stiff.body.report.substeps, 10);

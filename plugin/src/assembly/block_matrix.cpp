@@ -23,9 +23,22 @@ BlockMatrix::BlockMatrix(int num_particles, std::vector<std::pair<int, int>> pat
   }
   for (int i = 0; i < num_particles; ++i) row_begin_[i + 1] += row_begin_[i];
   blocks_.assign(columns_.size(), Matrix3::Zero());
+  for (int i = 0; i < num_particles; ++i) diagonal_.push_back(static_cast<int>(find(i, i)));
 }
 
-void BlockMatrix::set_zero() { std::fill(blocks_.begin(), blocks_.end(), Matrix3::Zero()); }
+void BlockMatrix::set_zero() {
+  std::fill(blocks_.begin(), blocks_.end(), Matrix3::Zero());
+  cursor_ = 0;
+}
+
+void BlockMatrix::scale(Real factor) {
+  for (Matrix3& block : blocks_) block *= factor;
+}
+
+void BlockMatrix::add(const BlockMatrix& other, Real scale) {
+  assert(other.columns_ == columns_ && "another pattern");
+  for (std::size_t k = 0; k < blocks_.size(); ++k) blocks_[k] += scale * other.blocks_[k];
+}
 
 std::ptrdiff_t BlockMatrix::find(int row, int column) const {
   const auto begin = columns_.begin() + row_begin_[row], end = columns_.begin() + row_begin_[row + 1];
@@ -33,10 +46,15 @@ std::ptrdiff_t BlockMatrix::find(int row, int column) const {
   return found != end && *found == column ? found - columns_.begin() : -1;
 }
 
-void BlockMatrix::add_block(int row, int column, const Matrix3& block) {
+int BlockMatrix::search(int row, int column) {
   const std::ptrdiff_t index = find(row, column);
   assert(index >= 0 && "block outside the pattern");
-  blocks_[index] += block;
+  if (cursor_ < slots_.size())
+    slots_[cursor_] = static_cast<int>(index);
+  else
+    slots_.push_back(static_cast<int>(index));
+  ++cursor_;
+  return static_cast<int>(index);
 }
 
 Matrix3 BlockMatrix::block(int row, int column) const {
@@ -45,10 +63,17 @@ Matrix3 BlockMatrix::block(int row, int column) const {
 }
 
 void BlockMatrix::add_product(const Vectors& x, Real scale, Forces y) const {
-  for (int row = 0; row < num_particles(); ++row) {
-    Vector3 sum = Vector3::Zero();
-    for (int k = row_begin_[row]; k < row_begin_[row + 1]; ++k) sum += blocks_[k] * x.col(columns_[k]).head<3>();
-    y.col(row).head<3>() += scale * sum;
+  const Real* block = blocks_.empty() ? nullptr : blocks_.front().data();
+  const Real* in = x.data();
+  Real* out = y.data();
+  for (int row = 0; row < num_particles(); ++row, out += 4) {
+    Real sum[3] = {0, 0, 0};
+    for (int k = row_begin_[row]; k < row_begin_[row + 1]; ++k, block += 9) {
+      const Real* v = in + 4 * static_cast<std::size_t>(columns_[k]);
+      for (int axis = 0; axis < 3; ++axis)
+        sum[axis] += block[axis] * v[0] + block[3 + axis] * v[1] + block[6 + axis] * v[2];
+    }
+    for (int axis = 0; axis < 3; ++axis) out[axis] += scale * sum[axis];
   }
 }
 

@@ -56,6 +56,20 @@ void PotentialField::append_rank_one_terms(const Positions& x, StiffnessModel mo
   for (const auto& potential : potentials_) potential->append_rank_one_terms(x, model, terms);
 }
 
+void PotentialField::add_damping(const Positions& x, Real time, BlockMatrix& damping) const {
+  for (const auto& potential : potentials_) potential->add_damping(x, time, damping);
+}
+
+void PotentialField::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
+  for (const auto& potential : potentials_) potential->append_damping_terms(x, time, terms);
+}
+
+Real PotentialField::choose_phase(const Positions& x) {
+  Real added = 0;
+  for (const auto& potential : potentials_) added += potential->choose_phase(x);
+  return added;
+}
+
 void PotentialField::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
                                            Forces df) const {
   for (const auto& potential : potentials_) potential->add_stiffness_product(x, model, dx, scale, df);

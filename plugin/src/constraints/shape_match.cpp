@@ -109,6 +109,22 @@ void ShapeMatch::damping_force(const Points<dynamic>& p, const Points<dynamic>& 
     force.col(i) = -damping * rest_->weights[i] * rest_->scale * (velocities.col(i) - rigid.at(p.col(i)));
 }
 
+ShapeMatch::PrincipalAxes ShapeMatch::principal_axes(const Points<dynamic>& p) const {
+  const RestShape& rest = *rest_;
+  PrincipalAxes principal{Vector3::Zero(), Vector3::Zero(), Matrix3::Identity()};
+  for (Eigen::Index i = 0; i < p.cols(); ++i) principal.center += rest.weights[i] / rest.total_weight * p.col(i);
+  Matrix3 inertia = Matrix3::Zero();
+  for (Eigen::Index i = 0; i < p.cols(); ++i) {
+    const Vector3 arm = p.col(i) - principal.center;
+    inertia += rest.weights[i] * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(inertia);
+  principal.axes = eigen.eigenvectors();
+  for (int k = 0; k < 3; ++k)
+    if (eigen.eigenvalues()[k] > 1e-12 * eigen.eigenvalues()[2]) principal.moments[k] = eigen.eigenvalues()[k];
+  return principal;
+}
+
 void ShapeMatch::damp(const Points<dynamic>& p, std::span<const Real> inverse_masses, Real damping,
                              Points<dynamic>& velocities) const {
   const Eigen::Index n = p.cols();

@@ -105,6 +105,8 @@ class Batch final : public ElementBatch {
   void add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const override;
   void append_pattern(std::vector<std::pair<int, int>>& pattern) const override;
   void append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const override;
+  void add_damping(const Positions& x, Real time, BlockMatrix& damping) const override;
+  void append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const override;
   void add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
                              Forces df) const override;
   void add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const override;
@@ -159,6 +161,10 @@ class Batch final : public ElementBatch {
   template <class VisitBlock, class VisitTerm>
   void visit_structured(std::size_t e, Scratch& s, StiffnessModel model, const VisitBlock& visit_block,
                         const VisitTerm& visit_term) const;
+
+  /// The modes that element e damps, with their weights in units of its damping; none of a slack element.
+  template <class Visit>
+  void visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const;
 
   std::vector<Stencil> stencils_;
   std::vector<Kind> kinds_;
@@ -395,6 +401,67 @@ void Batch<Kind>::add_stiffness_bounds(const Positions& x, std::span<Real> bound
 }
 
 template <ElementKind Kind>
+template <class Visit>
+void Batch<Kind>::visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const {
+  if (is_slack(e, s.points)) return;
+  if constexpr (Constraint<Kind>) {
+    value_and_gradient(kinds_[e], s.points, s.gradient);
+    visit(1, s.gradient);
+  } else if constexpr (HasDampingModes<Kind>) {
+    kinds_[e].visit_damping_modes(s.points, visit);
+  } else {
+    const Real psi = kinds_[e].energy_and_gradient(s.points, s.gradient);
+    if (psi > 0) visit(1 / (2 * psi), s.gradient);
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_damping(const Positions& x, Real time, BlockMatrix& matrix) const {
+  for (std::size_t e = 0; e < stencils_.size(); ++e) {
+    const Real damping = damping_time(e, time) * stiffnesses_[e];
+    if (!(damping > 0)) continue;
+    auto&& s = scratch(e);
+    gather(e, x, s.points);
+    const Stencil& stencil = stencils_[e];
+    if constexpr (HasRigidDamping<Kind>) {
+      if (is_slack(e, s.points)) continue;
+      kinds_[e].visit_damping(
+          s.points,
+          [&](int i, Real value) {
+            matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value));
+          },
+          [](Real, const Gradient<num_points>&) {});
+    } else if constexpr (num_points != dynamic) {
+      Hessian<num_points> d = Hessian<num_points>::Zero();
+      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& mode) {
+        d.noalias() += (damping * weight) * mode.reshaped() * mode.reshaped().transpose();
+      });
+      for (int i = 0; i < num_points; ++i)
+        for (int j = 0; j < num_points; ++j)
+          matrix.add_block(stencil[i], stencil[j], d.template block<3, 3>(3 * i, 3 * j));
+    }
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
+  if constexpr (num_points == dynamic)
+    for (std::size_t e = 0; e < stencils_.size(); ++e) {
+      const Real damping = damping_time(e, time) * stiffnesses_[e];
+      if (!(damping > 0)) continue;
+      Scratch& s = scratch_[e];
+      gather(e, x, s.points);
+      const auto append = [&](Real weight, const Gradient<num_points>& mode) {
+        terms.push_back({damping * weight, stencils_[e], mode});
+      };
+      if constexpr (HasRigidDamping<Kind>) {
+        if (!is_slack(e, s.points)) kinds_[e].visit_damping(s.points, [](int, Real) {}, append);
+      } else
+        visit_damping_modes(e, s, append);
+    }
+}
+
+template <ElementKind Kind>
 void Batch<Kind>::dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
                             Forces v) const {
   for (std::size_t e = 0; e < stencils_.size(); ++e) {
@@ -403,31 +470,24 @@ void Batch<Kind>::dissipate(const Positions& x, std::span<const Real> inverse_ma
     auto&& s = scratch(e);
     const Stencil& stencil = stencils_[e];
     gather(e, x, s.points);
-    if (is_slack(e, s.points)) continue;
-    const auto damp_along = [&](Real weight, const Gradient<num_points>& gradient) {
-      Real rate = 0, mobility = 0;  // dC/dt and dC M^-1 dCᵀ
-      for (Eigen::Index k = 0; k < gradient.cols(); ++k) {
-        rate += gradient.col(k).dot(v.col(stencil[k]).template head<3>());
-        mobility += inverse_masses[stencil[k]] * gradient.col(k).squaredNorm();
-      }
-      const Real impulse = -damping * weight * rate / (1 + damping * weight * mobility);
-      for (Eigen::Index k = 0; k < gradient.cols(); ++k)
-        v.col(stencil[k]).template head<3>() += inverse_masses[stencil[k]] * impulse * gradient.col(k);
-    };
-    if constexpr (Constraint<Kind>) {
-      value_and_gradient(kinds_[e], s.points, s.gradient);
-      damp_along(1, s.gradient);
-    } else if constexpr (HasDampingModes<Kind>) {
-      kinds_[e].visit_damping_modes(s.points, damp_along);
-    } else if constexpr (HasRigidDamping<Kind>) {
+    if constexpr (HasRigidDamping<Kind>) {
+      if (is_slack(e, s.points)) continue;
       for (std::size_t k = 0; k < stencil.size(); ++k) s.inverse_masses[k] = inverse_masses[stencil[k]];
       gather_points(stencil, v.data(), s.vectors);
       kinds_[e].damp(s.points, s.inverse_masses, damping, s.vectors);
       for (std::size_t k = 0; k < stencil.size(); ++k)
         v.col(stencil[k]).template head<3>() = s.vectors.col(static_cast<Eigen::Index>(k));
     } else {
-      const Real psi = kinds_[e].energy_and_gradient(s.points, s.gradient);
-      if (psi > 0) damp_along(1 / (2 * psi), s.gradient);
+      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& gradient) {
+        Real rate = 0, mobility = 0;  // dC/dt and dC M^-1 dCᵀ
+        for (Eigen::Index k = 0; k < gradient.cols(); ++k) {
+          rate += gradient.col(k).dot(v.col(stencil[k]).template head<3>());
+          mobility += inverse_masses[stencil[k]] * gradient.col(k).squaredNorm();
+        }
+        const Real impulse = -damping * weight * rate / (1 + damping * weight * mobility);
+        for (Eigen::Index k = 0; k < gradient.cols(); ++k)
+          v.col(stencil[k]).template head<3>() += inverse_masses[stencil[k]] * impulse * gradient.col(k);
+      });
     }
   }
 }

@@ -72,6 +72,11 @@ class Potential {
   virtual void dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
                          Forces v) const = 0;
 
+  /// D += the damping matrix [N s/m] of `add_damping_forces`, F = -D v, but for the terms of `append_damping_terms`; the
+  /// pattern is that of the stiffness.
+  virtual void add_damping(const Positions& x, Real time, BlockMatrix& damping) const = 0;
+  virtual void append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const = 0;
+
   /// Some elements have a damping time of their own: `dissipate` has work to do even at time 0.
   virtual bool damps() const = 0;
 
@@ -81,6 +86,10 @@ class Potential {
   virtual Real evolve(const Positions& x, Real duration) = 0;
   virtual void save_state() = 0;
   virtual void restore_state() = 0;
+
+  /// A potential of several phases chooses the one for `x`, before a step; returns the energy that this added [J]. Phases are
+  /// part of the state.
+  virtual Real choose_phase(const Positions& /*x*/) { return 0; }
 
   /// Grows with every change that may raise the stiffness: what was estimated from it is then out of date.
   virtual std::uint64_t stiffness_version() const = 0;

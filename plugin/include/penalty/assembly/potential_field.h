@@ -82,6 +82,9 @@ class PotentialField final : public Potential {
   void add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const override;
   void append_pattern(std::vector<std::pair<int, int>>& pattern) const override;
   void append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const override;
+  void add_damping(const Positions& x, Real time, BlockMatrix& damping) const override;
+  void append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const override;
+  Real choose_phase(const Positions& x) override;
   void add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
                              Forces df) const override;
   void add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const override;

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "penalty/assembly/potential_field.h"
-#include "penalty/solvers/explicit_step.h"
+#include "penalty/solvers/step.h"
 
 class btRigidBody;
 class btSoftBody;

@@ -91,6 +91,11 @@ class ShapeMatch {
     return force;
   }
 
+  /// The damping matrix of `damping_force`, in units of the damping, in the form of `visit_stiffness`: a diagonal, and
+  /// less the rigid motions, three translations and three rotations.
+  template <class VisitDiagonal, class VisitMode>
+  void visit_damping(const Points<dynamic>& p, const VisitDiagonal& visit_diagonal, const VisitMode& visit_mode) const;
+
   /// Damps `velocities` [m/s] implicitly, hence stably, by `damping` [J s²]: damping coefficient times time step. Free
   /// points: what is left after the rigid motion of their masses is divided by 1 + damping * sum w / (S0 * mass), and
   /// both momenta are kept. With pinned points (inverse mass 0, their velocities stay) each point is damped by
@@ -126,6 +131,16 @@ class ShapeMatch {
   };
   Spins spins(const Points<dynamic>& p, bool psd) const;
 
+  // The principal axes of the points as they are; a moment of zero: nothing turns about that axis.
+  struct PrincipalAxes {
+    Vector3 center, moments;
+    Matrix3 axes;
+  };
+  PrincipalAxes principal_axes(const Points<dynamic>& p) const;
+
+  template <class VisitMode>
+  void visit_translations(Gradient<dynamic>& mode, const VisitMode& visit_mode) const;
+
   std::vector<Real> weights_;
   std::shared_ptr<const RestShape> rest_;
 };
@@ -138,18 +153,42 @@ void ShapeMatch::visit_stiffness(const Points<dynamic>& p, bool psd, const Visit
   const int n = static_cast<int>(p.cols());
   for (int i = 0; i < n; ++i) visit_diagonal(i, rest.weights[i] * rest.scale);
 
-  Gradient<dynamic> mode = Gradient<dynamic>::Zero(3, n);
-  for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < n; ++i) mode(axis, i) = rest.weights[i];
-    visit_mode(-rest.scale / rest.total_weight, mode);
-    mode.row(axis).setZero();
-  }
-
+  Gradient<dynamic> mode(3, n);
+  visit_translations(mode, visit_mode);
   for (int k = 0; k < 3; ++k) {
     if (rotations.coefficients[k] == 0) continue;
     const Vector3 axis = rotations.axes.col(k);
     for (int i = 0; i < n; ++i) mode.col(i) = rest.weights[i] * (rotations.rotation * axis.cross(rest.arms.col(i)));
     visit_mode(rotations.coefficients[k], mode);
+  }
+}
+
+template <class VisitDiagonal, class VisitMode>
+void ShapeMatch::visit_damping(const Points<dynamic>& p, const VisitDiagonal& visit_diagonal,
+                               const VisitMode& visit_mode) const {
+  const RestShape& rest = *rest_;
+  const int n = static_cast<int>(p.cols());
+  for (int i = 0; i < n; ++i) visit_diagonal(i, rest.weights[i] * rest.scale);
+
+  Gradient<dynamic> mode(3, n);
+  visit_translations(mode, visit_mode);
+  const PrincipalAxes principal = principal_axes(p);
+  for (int k = 0; k < 3; ++k) {
+    if (!(principal.moments[k] > 0)) continue;
+    const Vector3 axis = principal.axes.col(k);
+    for (int i = 0; i < n; ++i)
+      mode.col(i) = rest.weights[i] * axis.cross(Vector3(p.col(i) - principal.center));
+    visit_mode(-rest.scale / principal.moments[k], mode);
+  }
+}
+
+template <class VisitMode>
+void ShapeMatch::visit_translations(Gradient<dynamic>& mode, const VisitMode& visit_mode) const {
+  mode.setZero();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (Eigen::Index i = 0; i < mode.cols(); ++i) mode(axis, i) = rest_->weights[i];
+    visit_mode(-rest_->scale / rest_->total_weight, mode);
+    mode.row(axis).setZero();
   }
 }
 

@@ -26,4 +26,6 @@ struct RigidBody {
   void drift(Real duration);
 };
 
+Real kinetic_energy(const RigidBody& body);  // [J]
+
 }  // namespace penalty

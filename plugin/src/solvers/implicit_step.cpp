@@ -1,0 +1,276 @@
+#include "implicit_step.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stepped_body.h"
+
+namespace penalty {
+namespace {
+
+constexpr int most_substeps = 16;        // of a step whose energy would grow
+constexpr Real growth_noise = 1e-12;     // relative growth of energy that is round-off
+constexpr Real round_off = 1e-12;        // of a sum of forces, relative to the sum of their magnitudes
+
+/// Mass, centre, momenta and inertia of particles that nothing holds.
+struct RigidState {
+  Real mass = 0;
+  Vector3 center = Vector3::Zero(), momentum = Vector3::Zero();
+  Vector3 spin = Vector3::Zero();      // angular momentum about the centre [kg m²/s]
+  Matrix3 inertia = Matrix3::Zero();   // about the centre [kg m²]
+
+  explicit RigidState(const Particles& particles, bool is_free = true) {
+    if (!is_free) return;
+    const Vector3 origin = particles.positions.col(0).head<3>();  // digits are scarce far from the world's
+    for (int i = 0; i < particles.size(); ++i) {
+      const Real m = 1 / particles.inverse_masses[i];
+      mass += m;
+      center += m * (particles.positions.col(i).head<3>() - origin);
+      momentum += m * particles.velocities.col(i).head<3>();
+    }
+    center = origin + center / mass;
+    for (int i = 0; i < particles.size(); ++i) {
+      const Real m = 1 / particles.inverse_masses[i];
+      const Vector3 arm = particles.positions.col(i).head<3>() - center;
+      spin += m * arm.cross(particles.velocities.col(i).head<3>() - momentum / mass);
+      inertia += m * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+    }
+  }
+
+  /// The angular velocity of least energy with an angular momentum [rad/s]; about a line that all particles are on there is
+  /// none.
+  Vector3 angular_velocity(const Vector3& angular_momentum) const {
+    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(inertia);
+    Vector3 turn = Vector3::Zero();
+    for (int k = 0; k < 3; ++k)
+      if (eigen.eigenvalues()[k] > 1e-12 * eigen.eigenvalues()[2]) {
+        const Vector3 axis = eigen.eigenvectors().col(k);
+        turn += axis.dot(angular_momentum) / eigen.eigenvalues()[k] * axis;
+      }
+    return turn;
+  }
+};
+
+/// One backward Euler step of a body.
+class ImplicitStep {
+ public:
+  ImplicitStep(SteppedBody& body, Real duration)
+      : body_(body), particles_(body.particles), state_(body.implicit), newton_(state_.newton), duration_(duration) {
+    if (!newton_.has_pattern_of(*body.potential)) newton_.set_pattern(*body.potential, particles_.size());
+    newton_.clear_fixed();
+    for (int i = 0; i < particles_.size(); ++i)
+      if (particles_.inverse_masses[i] == 0) newton_.fix(i);
+    newton_.linear = body.options.linear;
+    Objective& objective = newton_.objective;
+    objective.potential = body.potential;
+    objective.weights.resize(particles_.inverse_masses.size());
+    for (std::size_t i = 0; i < objective.weights.size(); ++i)
+      objective.weights[i] = inverse_or_zero(particles_.inverse_masses[i]) / (duration * duration);
+    objective.damping_time = body.options.damping_time;
+    objective.inverse_duration = 1 / duration;
+  }
+
+  void run();
+
+  /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned particles from
+  /// all velocities.
+  void cap_energy(Real allowed);
+
+ private:
+  void aim();
+  void choose_start();
+  void propose(const PackedVectors& x, Real& least);
+  void minimize();
+  void restore_momenta(const RigidState& before);
+  bool is_free() const { return newton_.fixed().empty(); }
+
+  SteppedBody& body_;
+  Particles& particles_;
+  ImplicitState& state_;
+  NewtonSolver& newton_;
+  Real duration_;
+};
+
+// Where the particles would be without elastic forces; pinned ones go where their velocity takes them.
+void ImplicitStep::aim() {
+  Objective& objective = newton_.objective;
+  objective.targets = state_.from + duration_ * particles_.velocities;
+  for (int i = 0; i < particles_.size(); ++i) {
+    const Real inverse_mass = particles_.inverse_masses[i];
+    if (!(inverse_mass > 0)) continue;
+    Vector3 acceleration = body_.gravity;
+    if (body_.external_forces.size() != 0) acceleration += inverse_mass * body_.external_forces.col(i).head<3>();
+    objective.targets.col(i).head<3>() += duration_ * duration_ * acceleration;
+  }
+  if (body_.options.damping_time > 0 || body_.potential->damps())
+    objective.damped_from = state_.from;
+  else
+    objective.damped_from.resize(4, 0);
+}
+
+void ImplicitStep::propose(const PackedVectors& x, Real& least) {
+  const Real value = newton_.value(x);
+  if (!(value < least)) return;
+  least = value;
+  state_.start = x;
+}
+
+// The best of four guesses: free flight, rest, the acceleration of the last step once more, and rigid motion.
+void ImplicitStep::choose_start() {
+  const Objective& objective = newton_.objective;
+  Real least = std::numeric_limits<Real>::infinity();
+  state_.start = objective.targets;
+  newton_.prepare();
+  propose(objective.targets, least);
+  PackedVectors& guess = state_.guess;
+  guess = state_.from;
+  for (const int i : newton_.fixed()) guess.col(i) = objective.targets.col(i);
+  propose(guess, least);
+  if (state_.has_acceleration) {
+    guess = state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration;
+    propose(guess, least);
+  }
+  if (!is_free()) return;
+  const RigidState rigid(particles_);
+  const Vector3 turn = duration_ * rigid.angular_velocity(rigid.spin);
+  const Real angle = turn.norm();
+  if (!(angle > 0)) return;
+  const Matrix3 rotation = Eigen::AngleAxis<Real>(angle, turn / angle).toRotationMatrix();
+  const Vector3 center = rigid.center + duration_ * rigid.momentum / rigid.mass + duration_ * duration_ * body_.gravity;
+  for (int i = 0; i < particles_.size(); ++i)
+    guess.col(i).head<3>() = rotation * (state_.from.col(i).head<3>() - rigid.center) + center;
+  propose(guess, least);
+}
+
+void ImplicitStep::minimize() {
+  newton_.start(state_.start);
+  Real first = 0;
+  for (int k = 0; k < body_.options.newton_iterations; ++k) {
+    const NewtonIteration iteration = newton_.iterate();
+    ++body_.report.newton_iterations;
+    body_.report.linear_iterations += iteration.linear_iterations;
+    if (k == 0) first = iteration.before;
+    if (iteration.length == 0 || iteration.after <= body_.options.newton_tolerance * body_.options.newton_tolerance * first) break;
+  }
+}
+
+// What the minimum, and iterations that end before it, take from the momenta of a free body.
+void ImplicitStep::restore_momenta(const RigidState& before) {
+  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();  // of the potential: only what acts from outside leaves any
+  Real forces = 0, torques = 0;
+  for (int i = 0; i < particles_.size(); ++i) {
+    const Vector3 f = newton_.forces().col(i).head<3>(), arm = newton_.positions().col(i).head<3>() - before.center;
+    force += f;
+    torque += arm.cross(f);
+    forces += f.norm();
+    torques += arm.norm() * f.norm();
+  }
+  if (force.norm() < round_off * forces) force.setZero();
+  if (torque.norm() < round_off * torques) torque.setZero();
+  Vector3 momentum = before.momentum + duration_ * (before.mass * body_.gravity + force);
+  Vector3 spin = before.spin + duration_ * torque;
+  if (body_.external_forces.size() != 0)
+    for (int i = 0; i < particles_.size(); ++i) {
+      const Vector3 impulse = duration_ * body_.external_forces.col(i).head<3>();
+      momentum += impulse;
+      spin += (state_.from.col(i).head<3>() - before.center).cross(impulse);
+    }
+  const RigidState now(particles_);
+  const Vector3 dv = (momentum - now.momentum) / now.mass, dw = now.angular_velocity(spin - now.spin);
+  for (int i = 0; i < particles_.size(); ++i) {
+    const Vector3 arm = particles_.positions.col(i).head<3>() - now.center;
+    particles_.velocities.col(i).head<3>() += dv + dw.cross(arm);
+    particles_.positions.col(i).head<3>() += duration_ * dv;
+  }
+}
+
+void ImplicitStep::cap_energy(Real allowed) {
+  const Real kinetic = kinetic_energy(particles_), excess = body_.elastic_energy + kinetic - allowed;
+  if (!(excess > 0)) return;
+  if (!is_free()) {
+    const Real share = std::sqrt(std::max<Real>(0, 1 - excess / kinetic));
+    for (int i = 0; i < particles_.size(); ++i)
+      if (particles_.inverse_masses[i] > 0) particles_.velocities.col(i) *= share;
+    return;
+  }
+  const RigidState rigid(particles_);
+  const Vector3 velocity = rigid.momentum / rigid.mass, turn = rigid.angular_velocity(rigid.spin);
+  const Real of_rigid = velocity.dot(rigid.momentum) / 2 + turn.dot(rigid.spin) / 2;
+  const Real of_deformation = kinetic - of_rigid;
+  if (!(of_deformation > 0)) return;
+  const Real share = std::sqrt(std::max<Real>(0, 1 - excess / of_deformation));
+  for (int i = 0; i < particles_.size(); ++i) {
+    const Vector3 as_rigid = velocity + turn.cross(Vector3(particles_.positions.col(i).head<3>() - rigid.center));
+    auto v = particles_.velocities.col(i).head<3>();
+    v = as_rigid + share * (v - as_rigid);
+  }
+}
+
+void ImplicitStep::run() {
+  state_.from = particles_.positions;
+  aim();
+  choose_start();
+  minimize();
+  const PackedVectors& end = newton_.positions();
+  const RigidState before(particles_, is_free());
+  state_.acceleration = ((end - state_.from) / duration_ - particles_.velocities) / duration_;
+  state_.has_acceleration = true;
+  for (int i = 0; i < particles_.size(); ++i)
+    if (particles_.inverse_masses[i] > 0) particles_.velocities.col(i) = (end.col(i) - state_.from.col(i)) / duration_;
+  particles_.positions = end;
+  if (is_free()) restore_momenta(before);
+
+  body_.elastic_energy = newton_.elastic_energy();
+  body_.forces = newton_.forces();
+  for (const int i : newton_.fixed())
+    body_.step_flows.driving -= duration_ * newton_.forces().col(i).dot(particles_.velocities.col(i));
+  if (body_.external_forces.size() != 0) body_.forces += body_.external_forces;
+  body_.step_flows.damping += newton_.damping_work();
+  if (body_.potential->evolves()) {
+    const Real taken = body_.potential->evolve(particles_.positions, duration_);
+    body_.step_flows.inelastic += taken;
+    if (taken != 0) evaluate_forces(body_);
+  }
+}
+
+}  // namespace
+
+void advance_implicitly(SteppedBody& body, Real duration) {
+  const Real start_energy = begin_step(body);
+  StepReport& report = body.report;
+  report.integrator = Integrator::implicit_step;
+  EnergyFlows& flows = body.step_flows;
+  Real end_energy = 0, allowed = 0;
+  bool finite = false;
+  for (int substeps = 1;; substeps *= 2, ++report.retries) {
+    report.substeps = substeps;
+    ImplicitStep step(body, duration / substeps);
+    for (int k = 0; k < substeps; ++k) step.run();
+    flows.constant_forces = constant_force_work(body);
+    allowed = start_energy + flows.received() - flows.lost();
+    // What drives pinned particles is known to the order of the step only.
+    if (flows.driving == 0) step.cap_energy(allowed);
+    end_energy = body.elastic_energy + kinetic_energy(body.particles);
+    finite = std::isfinite(end_energy);
+    const Real tolerance = flows.driving == 0 ? growth_noise : body.options.energy_tolerance;
+    if (finite && end_energy - allowed <= tolerance * std::max(start_energy, end_energy) + body.energy_noise) break;
+    if (substeps >= most_substeps || !std::isfinite(start_energy)) break;
+    undo_step(body);
+    flows = {};
+  }
+  report.finite = finite;
+  if (finite) {
+    flows.integration = allowed - end_energy;
+  } else {
+    SteppedBody* bodies[] = {&body};
+    name_bad_particles(bodies);
+    undo_step(body);
+    flows = {};
+    body.implicit.has_acceleration = false;
+  }
+  end_step(body, finite ? duration : 0);
+}
+
+}  // namespace penalty
