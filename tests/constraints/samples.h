@@ -1,6 +1,5 @@
 // Random elements of any kind: at rest, stretched, compressed, inverted, somewhere else; of any size and anywhere.
 #pragma once
-#include <Eigen/Eigenvalues>
 #include <stdexcept>
 
 #include "math/random.h"

@@ -2,10 +2,10 @@
 
 #include "penalty/math/rigid_fit.h"
 
-#include <Eigen/Eigenvalues>
 #include <limits>
 
 #include "constraints/dynamic_differences.h"
+#include "math/eigenvalues.h"
 
 namespace penalty::testing {
 namespace {
@@ -61,7 +61,7 @@ Matrix3 correlation(const Sample& s) {  // sum w p qᵀ
 
 // How well the best rotation is determined: (s2 + s3) / s1 with a signed s3.
 Real determinacy(const Matrix3& a) {
-  const Vector3 s = Eigen::JacobiSVD<Matrix3>(a).singularValues();
+  const Vector3 s = singular_values(a);
   return (s[1] + std::copysign(s[2], a.determinant())) / s[0];
 }
 
@@ -89,7 +89,7 @@ TEST(BestRotation, IsARotationThatNoOtherBeats) {
     const Matrix3 r = best_rotation(a);
     orthogonality.see((r.transpose() * r - Matrix3::Identity()).norm() + std::abs(r.determinant() - 1), seed);
     const Real best = (r.transpose() * a).trace();
-    const Vector3 s = Eigen::JacobiSVD<Matrix3>(a).singularValues();
+    const Vector3 s = singular_values(a);
     loss.see(s[0] + s[1] + std::copysign(s[2], a.determinant()) - best, seed);
     for (int k = 0; k < 200; ++k)
       EXPECT_LE(((random.rotation() * (k % 2 == 0 ? Matrix3::Identity() : r)).transpose() * a).trace(), best + 1e-14);
@@ -261,12 +261,9 @@ TEST(ShapeMatch, PositiveSemidefiniteStiffnessHasNoNegativeEigenvalue) {
     for (unsigned seed = 0; seed < 300; ++seed) {
       const Sample s = sample(seed, group);
       const Hessian<dynamic> exact = s.kind.energy_hessian(s.points), psd = assembled(s.kind, s.points, true);
-      const auto lowest = [](const Hessian<dynamic>& h) {
-        return Eigen::SelfAdjointEigenSolver<Hessian<dynamic>>(h, Eigen::EigenvaluesOnly).eigenvalues()[0];
-      };
-      indefinite += lowest(exact) < -1e-6 * psd.norm();
-      negative.see(-lowest(psd) / psd.norm(), seed);
-      lost.see(-lowest(psd - exact) / exact.norm(), seed);  // it only adds
+      indefinite += smallest_eigenvalue(exact) < -1e-6 * psd.norm();
+      negative.see(-smallest_eigenvalue(psd) / psd.norm(), seed);
+      lost.see(-smallest_eigenvalue(psd - exact) / exact.norm(), seed);  // it only adds
     }
   EXPECT_GT(indefinite, 200);
   negative.expect_below(1e-14, "lowest eigenvalue");

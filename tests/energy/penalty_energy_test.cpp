@@ -2,6 +2,7 @@
 #include "penalty/energy/penalty_energy.h"
 
 #include "constraints/samples.h"
+#include "math/eigenvalues.h"
 #include "penalty/math/finite_difference.h"
 
 namespace penalty::testing {
@@ -11,9 +12,6 @@ template <class Kind>
 class PenaltyEnergy : public ::testing::Test {
  protected:
   static constexpr int n = Kind::num_points;
-  static Real smallest_eigenvalue(const Hessian<n>& k) {
-    return Eigen::SelfAdjointEigenSolver<Hessian<n>>(k).eigenvalues()[0];
-  }
 };
 TYPED_TEST_SUITE(PenaltyEnergy, KindTypes);
 
@@ -104,7 +102,7 @@ TYPED_TEST(PenaltyEnergy, GaussNewtonStiffnessIsTheOuterProductOfTheGradient) {
     const Hessian<TestFixture::n> gauss_newton = stiffness_matrix(s.kind, k, s.points, StiffnessModel::gauss_newton);
     const Gradient<TestFixture::n> g = s.kind.gradient(s.points);
     error.see(relative_error(gauss_newton, k * g.reshaped() * g.reshaped().transpose()), seed);
-    negative.see(-TestFixture::smallest_eigenvalue(gauss_newton) / gauss_newton.norm(), seed);
+    negative.see(-smallest_eigenvalue(gauss_newton) / gauss_newton.norm(), seed);
   }
   error.expect_below(1e-14, "relative error");
   negative.expect_below(1e-14, "negative eigenvalue");
@@ -120,8 +118,8 @@ TYPED_TEST(PenaltyEnergy, ProjectedStiffnessIsTheNearestPositiveSemidefiniteOne)
     const Hessian<TestFixture::n> projected = stiffness_matrix(s.kind, k, s.points, StiffnessModel::psd_projected);
     const Hessian<TestFixture::n> added = projected - exact;
     indefinite += added.norm() > 1e-3 * exact.norm();
-    error.see(-TestFixture::smallest_eigenvalue(projected) / exact.norm(), seed);
-    error.see(-TestFixture::smallest_eigenvalue(added) / exact.norm(), seed);
+    error.see(-smallest_eigenvalue(projected) / exact.norm(), seed);
+    error.see(-smallest_eigenvalue(added) / exact.norm(), seed);
     error.see(std::abs(projected.cwiseProduct(added).sum()) / exact.squaredNorm(), seed);
   }
   if constexpr (HasHessian<TypeParam>) {

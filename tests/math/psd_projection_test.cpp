@@ -1,7 +1,6 @@
 #include "penalty/math/psd_projection.h"
 
-#include <Eigen/Eigenvalues>
-
+#include "math/eigenvalues.h"
 #include "math/random.h"
 
 namespace penalty::testing {
@@ -14,11 +13,6 @@ Eigen::Matrix<Real, Size, Size> random_symmetric(Random& random) {
   return a + a.transpose().eval();
 }
 
-template <int Size>
-Real smallest_eigenvalue(const Eigen::Matrix<Real, Size, Size>& a) {
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<Real, Size, Size>>(a).eigenvalues()[0];
-}
-
 // P is the nearest positive semidefinite matrix to A if and only if P >= 0, P - A >= 0 and <P, P - A> = 0: the
 // optimality conditions of projection onto a convex cone that is its own dual.
 template <int Size>
@@ -28,10 +22,10 @@ void expect_nearest() {
   for (unsigned seed = 0; seed < 100; ++seed) {
     Random random(seed);
     const Eigen::Matrix<Real, Size, Size> a = random_symmetric<Size>(random);
-    indefinite += smallest_eigenvalue<Size>(a) < -0.1;
+    indefinite += smallest_eigenvalue(a) < -0.1;
     const Eigen::Matrix<Real, Size, Size> p = psd_projection<Size>(a), rest = p - a;
-    error.see(-smallest_eigenvalue<Size>(p) / a.norm(), seed);
-    error.see(-smallest_eigenvalue<Size>(rest) / a.norm(), seed);
+    error.see(-smallest_eigenvalue(p) / a.norm(), seed);
+    error.see(-smallest_eigenvalue(rest) / a.norm(), seed);
     error.see(std::abs(p.cwiseProduct(rest).sum()) / a.squaredNorm(), seed);
     error.see((p - p.transpose()).norm() / a.norm(), seed);
   }

@@ -17,16 +17,9 @@ class Random {
 
   unsigned index(unsigned size) { return static_cast<unsigned>(engine_() % size); }
   Real uniform(Real low, Real high) { return low + (high - low) * static_cast<Real>(engine_()) * 0x1p-32; }
-  Vector3 vector(Real size) {
-    const Real x = uniform(-size, size), y = uniform(-size, size), z = uniform(-size, size);
-    return {x, y, z};
-  }
-  Vector3 direction() {
-    Vector3 v = vector(1);
-    while (v.norm() < 0.1) v = vector(1);
-    return v.normalized();
-  }
-  Matrix3 rotation() { return Eigen::AngleAxis<Real>(uniform(-3.1, 3.1), direction()).toRotationMatrix(); }
+  Vector3 vector(Real size);
+  Vector3 direction();
+  Matrix3 rotation();
 
   template <int Columns>
   Eigen::Matrix<Real, 3, Columns> vectors(Eigen::Index columns, Real size) {
@@ -42,31 +35,10 @@ class Random {
 /// The largest of many errors and the seed that made it; not-a-number counts as the largest.
 class WorstError {
  public:
-  void see(Real error, unsigned seed) {
-    ++count_;
-    if (std::isnan(error_) || error <= error_) return;
-    error_ = error;
-    seed_ = seed;
-  }
-
-  void expect_below(Real tolerance, const std::string& law) const {
-    EXPECT_GT(count_, 0) << law << ": nothing was checked";
-    EXPECT_LT(error_, tolerance) << law << ", seed " << seed_;
-    ::testing::Test::RecordProperty(key(law), text(error_));
-  }
+  void see(Real error, unsigned seed);
+  void expect_below(Real tolerance, const std::string& law) const;
 
  private:
-  static std::string key(std::string law) {
-    for (char& c : law)
-      if (c == ' ') c = '_';
-    return law;
-  }
-  static std::string text(Real value) {
-    char buffer[32];
-    std::snprintf(buffer, sizeof buffer, "%.2g", value);
-    return buffer;
-  }
-
   int count_ = 0;
   Real error_ = -1;
   unsigned seed_ = 0;
