@@ -9,7 +9,9 @@ namespace {
 /// y along `direction`.
 Transform placed(const Eigen::Vector3d& center, const Eigen::Vector3d& direction) {
   Transform transform = at(center);
-  transform.leftCols<3>() = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), direction).toRotationMatrix();
+  transform.col(0) = direction.unitOrthogonal();
+  transform.col(1) = direction;
+  transform.col(2) = transform.col(0).cross(direction);
   return transform;
 }
 
