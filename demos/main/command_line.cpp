@@ -74,14 +74,14 @@ CommandLine parse(int argc, const char* const* argv) {
 
   RunOptions options;
   SceneOptions& scene = options.scene_options;
-  std::string world = "classic", start = "rest", quality = "preview", backend = "auto", coloring = "energy", model;
-  std::optional<long long> seed, seeds, cells, substeps, spheres;
+  std::string world = "classic", integrator = "auto", start, quality = "preview", backend = "auto", coloring = "energy", model;
+  std::optional<long long> seed, seeds, cells, phases, substeps, spheres;
   std::string out;
   bool no_render = false, no_scale = false;
 
   run->add_option("scene", options.scene, "One of the scenes of `penalty-demo list`")->required()->type_name("SCENE");
   run->add_option("--world", world, "Bullet's world: classic or deformable")->type_name("NAME");
-  run->add_option("--integrator", options.integrator, "auto, explicit or implicit")->type_name("NAME");
+  run->add_option("--integrator", integrator, "auto, explicit or implicit")->type_name("NAME");
   run->add_option(
          "--mesh", scene.mesh,
          "Tetrahedra (.vtk, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
@@ -98,11 +98,14 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_option("--model", model, "Of tetrahedra: springs (and volumes), springs+areas or neo-hookean")
       ->type_name("NAME")
       ->excludes(stiffness);
+  run->add_option("--phases", phases, "1, or 2: tetrahedra give way far from their rest shape, and so find back to it")
+      ->type_name("N")
+      ->excludes(stiffness);
   run->add_option("--damping", scene.damping, "Ratio of damping to stiffness [s]")->type_name("S");
   run->add_option("--drag", scene.drag, "Rate at which velocities decay [1/s]")->type_name("RATE");
   run->add_option("--substeps", substeps, "Substeps in a world step; 0: from the stability limit")->type_name("N");
   run->add_option("--spheres", spheres, "Rigid balls in scene drop")->type_name("N");
-  run->add_option("--start", start, "rest, squash, plane, line, point, mirror or scramble")->type_name("NAME");
+  run->add_option("--start", start, "rest, squash, plane, line, point, mirror, scramble or jitter")->type_name("NAME");
   run->add_option("--seed", seed, "Seed of everything random, 0 or more")->type_name("N");
   run->add_option("--seeds", seeds, "Runs with this many seeds, from --seed on")->type_name("N");
   run->add_option("--rate", options.rate, "World steps a second")->type_name("HZ");
@@ -130,7 +133,8 @@ CommandLine parse(int argc, const char* const* argv) {
   try {
     find_scene(options.scene);
     options.world = world_from_name(world);
-    scene.start = start_from_name(start);
+    scene.integrator = integrator_from_name(integrator);
+    if (run->count("--start") > 0) scene.start = start_from_name(start);
     if (run->count("--model") > 0) scene.model = model_from_name(model);
     options.quality = render::quality_from_name(quality);
     options.backend = render::backend_from_name(backend);
@@ -140,10 +144,6 @@ CommandLine parse(int argc, const char* const* argv) {
   if (coloring != "energy" && coloring != "strain")
     throw UsageError("unknown colouring \"" + coloring + "\", must be one of energy, strain");
   options.coloring = coloring == "energy" ? Coloring::energy : Coloring::strain;
-  if (options.integrator == "implicit")
-    throw UsageError("--integrator implicit: this version has the explicit step only");
-  if (options.integrator != "auto" && options.integrator != "explicit")
-    throw UsageError("unknown integrator \"" + options.integrator + "\", must be one of auto, explicit, implicit");
 
   require(options.rate > 0 && options.rate <= highest_rate, "--rate", options.rate,
           "positive and at most " + shown(highest_rate) + " Hz");
@@ -156,6 +156,7 @@ CommandLine parse(int argc, const char* const* argv) {
   require_not_negative(options.still, "--still");
   num_steps(options.duration.value_or(find_scene(options.scene).duration), options.rate);
   scene.cells = whole(cells, "--cells", 1, 1000);
+  scene.phases = whole(phases, "--phases", 1, 2);
   scene.spheres = whole(spheres, "--spheres", 0, 1000);
   scene.substeps = whole(substeps, "--substeps", 0, 1000000);
   if (const auto value = whole(seed, "--seed", 0, 2147483647)) scene.seed = static_cast<std::uint32_t>(*value);

@@ -23,7 +23,6 @@ enum class Coloring { energy, strain };
 struct RunOptions {
   std::string scene;
   WorldKind world = WorldKind::classic;
-  std::string integrator = "auto";
   SceneOptions scene_options;
   int seeds = 0;                 // 0: one run, no statistics
   Real rate = 60;                // world steps a second

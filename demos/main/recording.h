@@ -24,7 +24,8 @@ struct StepRecord {
   ShapeErrors errors;
   Real penetration = 0;    // below the true rigid surfaces [m]
   Real contact_depth = 0;  // below the planes of contact, which lie a margin outside [m]
-  int substeps = 0, retries = 0;
+  bool implicit = false;  // the step was
+  int substeps = 0, retries = 0, newton_iterations = 0;
   Real milliseconds = 0;             // CPU time of the world step
   std::optional<Real> tip_drop;      // [m]
   std::vector<BatchRecord> batches;  // in the order of the field
@@ -44,6 +45,7 @@ inline constexpr EnergyFlow energy_flows[] = {{"constant_forces", &EnergyFlows::
                                               {"damping", &EnergyFlows::damping},
                                               {"drag", &EnergyFlows::drag},
                                               {"inelastic", &EnergyFlows::inelastic},
+                                              {"integration", &EnergyFlows::integration},
                                               {"contact_loss", &EnergyFlows::contact_loss}};
 
 /// What a picture needs.

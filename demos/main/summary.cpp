@@ -80,6 +80,13 @@ std::optional<Real> mean_tip_drop(const std::vector<StepRecord>& steps) {
   return sum / 15;
 }
 
+/// Of the steps that were taken: "explicit", "implicit", or "mixed".
+std::string integrator_used(const std::vector<StepRecord>& taken) {
+  const auto implicit = std::count_if(taken.begin(), taken.end(), [](const StepRecord& step) { return step.implicit; });
+  if (implicit == 0) return "explicit";
+  return implicit == static_cast<std::ptrdiff_t>(taken.size()) ? "implicit" : "mixed";
+}
+
 }  // namespace
 
 Json summarize(const Recording& recording, const RunOptions& options, const BodyMesh& body) {
@@ -89,6 +96,7 @@ Json summarize(const Recording& recording, const RunOptions& options, const Body
   const std::vector<Real> total = column(steps, [](const auto& s) { return s.energies.total(); });
   const std::vector<Real> milliseconds = over_steps([](const auto& s) { return s.milliseconds; });
   const std::vector<Real> substeps = over_steps([](const auto& s) { return s.substeps; });
+  const std::vector<Real> newton_iterations = over_steps([](const auto& s) { return s.newton_iterations; });
   const StepRecord& last = steps.back();
   Real gain = 0;
   for (std::size_t i = 1; i < total.size(); ++i) gain = std::max(gain, total[i] - total[i - 1]);
@@ -98,19 +106,20 @@ Json summarize(const Recording& recording, const RunOptions& options, const Body
   Json json;
   json["scene"] = options.scene;
   json["world"] = name_of(options.world);
-  json["integrator"] = "explicit";
+  json["integrator"] = integrator_used(taken);
   json["precision"] = bullet_precision();
   json["mesh"] = {{"source", body.source()},
                   {"vertices", body.vertices().cols()},
                   {"tetrahedra", body.tetrahedra().size()},
                   {"triangles", body.drawn_triangles().size()},
                   {"edges", body.edges().size()}};
-  json["start"] = name_of(options.scene_options.start);
+  json["start"] = options.scene_options.start ? Json(name_of(*options.scene_options.start)) : Json(nullptr);
   json["seed"] = recording.seed;
   json["dt"] = 1 / options.rate;
   json["steps"] = taken.size();
   json["ms_per_step"] = {{"median", number(median(milliseconds))}, {"max", number(largest(milliseconds))}};
   json["substeps"] = {{"mean", number(mean(substeps))}, {"max", number(largest(substeps))}};
+  json["newton_iterations"] = {{"mean", number(mean(newton_iterations))}, {"max", number(largest(newton_iterations))}};
   json["retries"] = retries;
   json["energy"] = energy_summary(total);
   json["elastic_energy"] = energy_summary(column(steps, [](const auto& s) { return s.energies.elastic; }));

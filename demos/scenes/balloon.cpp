@@ -70,7 +70,7 @@ SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
 
   Eigen::Index nozzle = 0;
   body.vertices().row(1).minCoeff(&nozzle);
-  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start.value_or(Start::rest), options.seed);
   positions.col(nozzle) = body.vertices().col(nozzle);
   return {
       .name = "balloon",

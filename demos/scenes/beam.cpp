@@ -51,7 +51,7 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
     if (rest(0, i) < 1e-9 * length) pinned.push_back(i);
     if (rest(0, i) > (1 - 1e-9) * length) tip.push_back(i);
   }
-  Eigen::Matrix3Xd positions = start_positions(rest, options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(rest, options.start.value_or(Start::rest), options.seed);
   for (int i : pinned) positions.col(i) = rest.col(i);
 
   return {.name = "beam",

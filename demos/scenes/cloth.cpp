@@ -47,7 +47,7 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
 
   const int side = static_cast<int>(std::lround(std::sqrt(num_vertices)));
   const std::vector<int> corners{0, side - 1, num_vertices - side, num_vertices - 1};
-  Eigen::Matrix3Xd positions = start_positions(rest, options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(rest, options.start.value_or(Start::rest), options.seed);
   Eigen::Matrix3Xd folded = rest;
   // Pleated like a fan, along lines of the mesh: narrower than flat, and yet every edge has its rest length.
   const int cells = side - 1, pleat = std::max(1, cells / pleats);
@@ -56,7 +56,7 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
     const int column = i % side, phase = column % (2 * pleat);
     folded.col(i) << slack * rest(0, i), height - rise * std::min(phase, 2 * pleat - phase), rest(2, i);
   }
-  if (options.start == Start::rest) positions = folded;
+  if (options.start.value_or(Start::rest) == Start::rest) positions = folded;
   for (int i : corners) positions.col(i) = folded.col(i);
 
   std::vector<RigidObject> balls;

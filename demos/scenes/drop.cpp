@@ -47,7 +47,7 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
     throw std::invalid_argument("--spheres is " + std::to_string(count) + ", must be 0 to 1000");
   Elasticity elastic = elasticity(options, body.solid(), jelly);
 
-  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start.value_or(Start::rest), options.seed);
   positions.row(1).array() += height - body.drawn(positions).row(1).minCoeff();
 
   return {.name = "drop",

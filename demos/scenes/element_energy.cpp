@@ -7,18 +7,11 @@
 namespace penalty::demo {
 namespace {
 
-using OtherKinds = KindList<Attachment, EnclosedVolume, ShapeMatch, StableNeoHookean>;
-
-/// Calls visit(batch) for every batch of one of the kinds.
-template <class... Kinds, class Visit>
-void for_each_batch(KindList<Kinds...>, const PotentialField& field, const Visit& visit) {
+template <class Visit>
+void for_each_length_batch(const PotentialField& field, const Visit& visit) {
   for (const auto& potential : field.potentials()) {
-    if (const auto* nested = dynamic_cast<const PotentialField*>(potential.get()))
-      for_each_batch(KindList<Kinds...>(), *nested, visit);
-    const auto visit_kind = [&]<class Kind>(const Batch<Kind>* batch) {
-      if (batch) visit(*batch);
-    };
-    (visit_kind(dynamic_cast<const Batch<Kinds>*>(potential.get())), ...);
+    if (const auto* nested = dynamic_cast<const PotentialField*>(potential.get())) for_each_length_batch(*nested, visit);
+    if (const auto* batch = dynamic_cast<const Batch<Length>*>(potential.get())) visit(*batch);
   }
 }
 
@@ -26,21 +19,13 @@ void for_each_batch(KindList<Kinds...>, const PotentialField& field, const Visit
 
 Eigen::VectorXd particle_energies(const PotentialField& field, const Positions& x) {
   Eigen::VectorXd energies = Eigen::VectorXd::Zero(field.num_particles());
-  const auto add = [&]<class Kind>(const Batch<Kind>& batch) {
-    std::vector<Real> element_energies;
-    batch.append_energies(x, element_energies);
-    for (std::size_t e = 0; e < element_energies.size(); ++e)
-      for (int i : batch.stencils()[e])
-        energies[i] += element_energies[e] / static_cast<Real>(batch.stencils()[e].size());
-  };
-  for_each_batch(AllKinds(), field, add);
-  for_each_batch(OtherKinds(), field, add);
+  field.add_particle_energies(x, {energies.data(), static_cast<std::size_t>(energies.size())});
   return energies;
 }
 
 Eigen::VectorXd particle_strains(const PotentialField& field, const Positions& x) {
   Eigen::VectorXd sums = Eigen::VectorXd::Zero(field.num_particles()), counts = sums;
-  for_each_batch(KindList<Length>(), field, [&](const Batch<Length>& batch) {
+  for_each_length_batch(field, [&](const Batch<Length>& batch) {
     std::vector<Real> strains;
     batch.append_strains(x, strains);
     for (std::size_t e = 0; e < strains.size(); ++e)
@@ -54,7 +39,7 @@ Eigen::VectorXd particle_strains(const PotentialField& field, const Positions& x
 
 std::vector<Triangle> unbroken_triangles(const BodyMesh& body, const PotentialField& field) {
   std::set<Edge> broken;
-  for_each_batch(KindList<Length>(), field, [&](const Batch<Length>& batch) {
+  for_each_length_batch(field, [&](const Batch<Length>& batch) {
     for (const Break& b : batch.breaks())
       if (!batch.is_enabled(b.element)) broken.insert(batch.stencils()[b.element]);
   });

@@ -19,9 +19,9 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
   if (!options.stiffness && !options.young && !options.poisson && !options.model) chosen.stiffness = stiffness;
   Elasticity elastic = elasticity(chosen, body.solid(), {});
 
-  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start.value_or(Start::rest), options.seed);
   Eigen::Matrix3Xd velocities = Eigen::Matrix3Xd::Zero(3, positions.cols());
-  const bool hard = options.start != Start::rest;
+  const bool hard = options.start.value_or(Start::rest) != Start::rest;
   if (!hard) {
     positions.row(0) *= stretch;
     const Vector3 drift(0.1, 0.06, 0), spin(1.2, 2.0, 0.6);  // [m/s], [rad/s]

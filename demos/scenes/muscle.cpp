@@ -58,7 +58,7 @@ SceneSetup muscle(const SceneOptions& options, const BodyMesh& body) {
   const auto middles = std::make_shared<std::vector<Real>>();
   for (const auto& [a, b] : fibres) middles->push_back((rest(0, a) + rest(0, b)) / 2);
 
-  const Eigen::Matrix3Xd positions = start_positions(rest, options.start, options.seed);
+  const Eigen::Matrix3Xd positions = start_positions(rest, options.start.value_or(Start::rest), options.seed);
   const Real start = positions.row(0).mean();
   return {.name = "muscle",
           .title = "A worm crawls",

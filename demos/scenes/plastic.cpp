@@ -86,7 +86,7 @@ BodyMesh plastic_body(const SceneOptions& options) {
 }
 
 SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
-  if (options.start != Start::rest)
+  if (options.start.value_or(Start::rest) != Start::rest)
     throw std::invalid_argument("scene plastic starts at rest: from elsewhere it would flow at once");
   Elasticity elastic = elasticity(options, body.solid(), metal);
   elastic.field.find<Length>()->set_plasticity(flow);

@@ -106,6 +106,7 @@ struct Scene::Impl {
   std::unique_ptr<btSoftBody> body;
   std::vector<ContactPoint> contact_points;
   Real tip_start = 0, time = 0;
+  std::size_t restarts_done = 0;
   Real time_asleep = 0;  // [s]
   int wakings = 0;
 
@@ -181,6 +182,16 @@ struct Scene::Impl {
     tip_start = mean_tip_height(pack(setup.positions));
   }
 
+  void restart_if_due(Real step) {
+    while (restarts_done < setup.restarts.size() && time >= setup.restarts[restarts_done].time - step / 4) {
+      const Eigen::Matrix3Xd& positions = setup.restarts[restarts_done++].positions;
+      for (int i = 0; i < body->m_nodes.size(); ++i) {
+        body->m_nodes[i].m_x = to_bullet(positions.col(i));
+        body->m_nodes[i].m_v.setZero();
+      }
+    }
+  }
+
   const Particles& particles() const { return const_cast<World&>(world).attached().particles(*body); }
 
   Real mean_tip_height(const Positions& x) const {
@@ -198,6 +209,7 @@ void Scene::step(Real duration) {
   const bool was_asleep = is_asleep();
   if (scene.setup.control && scene.time >= scene.setup.control_start - duration / 4)
     scene.setup.control(scene.world.attached().edit(*scene.body), scene.time);
+  scene.restart_if_due(duration);
   scene.time += duration;
   for (std::size_t b = 0; b < scene.setup.objects.size(); ++b)
     if (const auto& path = scene.setup.objects[b].path)
@@ -291,7 +303,7 @@ std::vector<Fact> Scene::facts() const {
 bool Scene::is_free() const {
   const SceneSetup& setup = impl_->setup;
   return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.objects.empty() &&
-         setup.step.drag == 0;
+         setup.step.drag == 0 && setup.restarts.empty();
 }
 
 }  // namespace penalty::demo

@@ -1,5 +1,6 @@
 #include <stdexcept>
 
+#include "penalty/assembly/two_phase.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
@@ -16,6 +17,7 @@ const std::vector<SceneEntry>& scenes() {
       {"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear},
       {"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
        user_constraint_body, user_constraint},
+      {"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 12, recover_body, recover},
       {"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6, nullptr,
        nullptr, potential_field}};
   return list;
@@ -30,19 +32,34 @@ const SceneEntry& find_scene(std::string_view name) {
   throw std::invalid_argument("unknown scene \"" + std::string(name) + "\", must be one of " + choices);
 }
 
-Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default) {
+namespace {
+
+PotentialField elastic(const TetMesh& mesh, const Material& material, ElasticModel model) {
+  return make_elastic_field(mesh.vertices, mesh.tetrahedra, material, model);
+}
+
+PotentialField recovering(const TetMesh& mesh, const Material& material, ElasticModel model) {
+  return make_recovering_field(mesh.vertices, mesh.tetrahedra, material, model);
+}
+
+}  // namespace
+
+Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default,
+                      ElasticModel default_model, int phases) {
   if (options.stiffness) return {make_elastic_field(mesh.vertices, mesh.tetrahedra, *options.stiffness), 1};
   Material material = by_default;
   if (options.young) material.young = *options.young;
   if (options.poisson) material.poisson = *options.poisson;
-  const ElasticModel model = options.model.value_or(ElasticModel::springs_volumes);
+  const ElasticModel model = options.model.value_or(default_model);
   material.check(model);
-  return {make_elastic_field(mesh.vertices, mesh.tetrahedra, material, model), material.density * volume(mesh)};
+  const auto make = options.phases.value_or(phases) == 2 ? &recovering : &elastic;
+  return {make(mesh, material, model), material.density * volume(mesh)};
 }
 
 StepOptions step_options(const SceneOptions& options, StepOptions by_default) {
   if (options.damping) by_default.damping_time = *options.damping;
   if (options.drag) by_default.drag = *options.drag;
+  if (options.integrator) by_default.integrator = *options.integrator;
   if (options.substeps) by_default.substeps = *options.substeps;
   by_default.check();
   return by_default;

@@ -20,6 +20,12 @@ struct Look {
   bool wire = true;                   // the edges of the triangles, but for an embedded surface
 };
 
+/// The body is put somewhere else, at rest.
+struct Restart {
+  Real time;  // [s]
+  Eigen::Matrix3Xd positions;
+};
+
 struct SceneSetup {
   std::string name;
   std::string title;  // of pictures
@@ -27,6 +33,7 @@ struct SceneSetup {
   PotentialField field;
   Real mass = 1;                           // of the soft body, the same for every vertex [kg]
   Eigen::Matrix3Xd positions, velocities;  // at the start, 3 x vertices [m], [m/s]
+  std::vector<Restart> restarts = {};      // in the course of the scene, in order
   std::vector<int> pinned;                 // vertices that nothing moves
   Vector3 gravity = Vector3::Zero();       // [m/s²]
   bool ground = false;                     // a static box whose top is y = 0
@@ -78,6 +85,8 @@ BodyMesh tear_body(const SceneOptions& options);
 SceneSetup tear(const SceneOptions& options, const BodyMesh& body);
 BodyMesh user_constraint_body(const SceneOptions& options);
 SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body);
+BodyMesh recover_body(const SceneOptions& options);
+SceneSetup recover(const SceneOptions& options, const BodyMesh& body);
 std::vector<Figure> potential_field(const SceneOptions& options);
 
 /// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
@@ -86,7 +95,8 @@ struct Elasticity {
   PotentialField field;
   Real mass;  // [kg]
 };
-Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default);
+Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default,
+                      ElasticModel default_model = ElasticModel::springs_volumes, int phases = 1);
 
 /// `by_default` with what the user chose. Throws std::invalid_argument.
 StepOptions step_options(const SceneOptions& options, StepOptions by_default);

@@ -50,7 +50,7 @@ BodyMesh tear_body(const SceneOptions& options) {
 }
 
 SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
-  if (options.start != Start::rest)
+  if (options.start.value_or(Start::rest) != Start::rest)
     throw std::invalid_argument("scene tear starts at rest: from elsewhere it would break");
   if (options.poisson || options.young || options.stiffness)
     throw std::invalid_argument("scene tear has a sheet of its own: --young, --poisson and --stiffness do not apply");

@@ -81,7 +81,7 @@ SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
   std::vector<int> held;
   for (int i = 0; i < rest.cols(); ++i)
     if (rest(1, i) > ground_clearance + length - 1e-9) held.push_back(i);
-  Eigen::Matrix3Xd positions = start_positions(rest, options.start, options.seed);
+  Eigen::Matrix3Xd positions = start_positions(rest, options.start.value_or(Start::rest), options.seed);
   for (int i : held) positions.col(i) = rest.col(i);
   return {.name = "user_constraint",
           .title = "A bar winds itself up",

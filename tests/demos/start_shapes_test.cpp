@@ -40,9 +40,20 @@ TEST(StartShapes, ScrambleFillsTheBoxAndFollowsTheSeed) {
   EXPECT_GT((scrambled - rest()).colwise().norm().mean(), 0.3);
 }
 
+TEST(StartShapes, JitterMovesEveryVertexALittle) {
+  const Eigen::Matrix3Xd moved = start_positions(rest(), Start::jitter, 4);
+  EXPECT_EQ(moved, start_positions(rest(), Start::jitter, 4));
+  EXPECT_NE(moved, start_positions(rest(), Start::jitter, 5));
+  const Real spacing = extent(rest()).norm() / std::cbrt(static_cast<Real>(rest().cols()));
+  EXPECT_LE((moved - rest()).cwiseAbs().maxCoeff(), spacing / 2);
+  EXPECT_GT((moved - rest()).cwiseAbs().minCoeff(), 0);
+  EXPECT_NEAR((moved - rest()).cwiseAbs().mean(), spacing / 4, spacing / 40);
+}
+
 TEST(StartShapes, NamesGoThereAndBack) {
-  for (const char* name : {"rest", "squash", "plane", "line", "point", "mirror", "scramble"})
+  for (const char* name : {"rest", "squash", "plane", "line", "point", "mirror", "scramble", "jitter"})
     EXPECT_EQ(name_of(start_from_name(name)), name);
+  EXPECT_EQ(all_starts().size(), 8u);
   EXPECT_THROW(start_from_name("Rest"), std::invalid_argument);
   EXPECT_THROW(world_from_name(""), std::invalid_argument);
 }

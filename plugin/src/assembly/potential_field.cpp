@@ -124,6 +124,10 @@ void PotentialField::append_energies(const Positions& x, std::vector<Real>& ener
   for (const auto& potential : potentials_) potential->append_energies(x, energies);
 }
 
+void PotentialField::add_particle_energies(const Positions& x, std::span<Real> energies) const {
+  for (const auto& potential : potentials_) potential->add_particle_energies(x, energies);
+}
+
 void PotentialField::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
   for (const auto& potential : potentials_) potential->append_ledger(x, ledger);
 }

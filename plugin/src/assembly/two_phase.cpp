@@ -128,6 +128,10 @@ void TwoPhase::append_energies(const Positions& x, std::vector<Real>& energies) 
   if (soft_active_) energies.resize(energies.size() + fields_[1].num_elements(), 0);
 }
 
+void TwoPhase::add_particle_energies(const Positions& x, std::span<Real> energies) const {
+  active().add_particle_energies(x, energies);
+}
+
 void TwoPhase::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
   for (const PotentialField& field : fields_) {
     const std::size_t first = ledger.size();

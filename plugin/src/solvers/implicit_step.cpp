@@ -13,6 +13,7 @@ namespace {
 constexpr int most_substeps = 16;        // of a step whose energy would grow
 constexpr Real growth_noise = 1e-12;     // relative growth of energy that is round-off
 constexpr Real round_off = 1e-12;        // of a sum of forces, relative to the sum of their magnitudes
+constexpr Real round_off2 = 1e-28;       // square of that of positions, relative to the size of the body
 
 /// Mass, centre, momenta and inertia of particles that nothing holds.
 struct RigidState {
@@ -146,13 +147,16 @@ void ImplicitStep::choose_start() {
 
 void ImplicitStep::minimize() {
   newton_.start(state_.start);
-  Real first = 0;
+  const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
+  const Real stiffness = 1 / (duration_ * duration_) + body_.largest_eigenvalue;  // of inertia and elements, per mass
+  const Real noise = round_off2 * body_.mass * stiffness * body_.rest_span.spreads.squaredNorm();
+  Real enough = 0;
   for (int k = 0; k < body_.options.newton_iterations; ++k) {
     const NewtonIteration iteration = newton_.iterate();
     ++body_.report.newton_iterations;
     body_.report.linear_iterations += iteration.linear_iterations;
-    if (k == 0) first = iteration.before;
-    if (iteration.length == 0 || iteration.after <= body_.options.newton_tolerance * body_.options.newton_tolerance * first) break;
+    if (k == 0) enough = std::max(tolerance2 * iteration.before, noise);
+    if (iteration.length == 0 || iteration.after <= enough) break;
   }
 }
 

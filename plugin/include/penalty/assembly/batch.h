@@ -116,6 +116,7 @@ class Batch final : public ElementBatch {
   Real evolve(const Positions& x, Real duration) override;
   void append_strains(const Positions& x, std::vector<Real>& strains) const override;
   void append_energies(const Positions& x, std::vector<Real>& energies) const override;
+  void add_particle_energies(const Positions& x, std::span<Real> energies) const override;
   void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
 
  private:
@@ -522,6 +523,17 @@ void Batch<Kind>::append_energies(const Positions& x, std::vector<Real>& energie
     auto&& s = scratch(e);
     gather(e, x, s.points);
     energies.push_back(is_off(e) ? 0 : penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)));
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_particle_energies(const Positions& x, std::span<Real> energies) const {
+  for (std::size_t e = 0; e < stencils_.size(); ++e) {
+    if (is_off(e)) continue;
+    auto&& s = scratch(e);
+    gather(e, x, s.points);
+    const Real share = penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)) / static_cast<Real>(stencils_[e].size());
+    for (const int i : stencils_[e]) energies[i] += share;
   }
 }
 

@@ -101,6 +101,9 @@ class Potential {
   /// Appends the energy of every element, in the same order [J].
   virtual void append_energies(const Positions& x, std::vector<Real>& energies) const = 0;
 
+  /// energies[i] += the share of particle i in the energy of each of its elements: equal shares for all of its points [J].
+  virtual void add_particle_energies(const Positions& x, std::span<Real> energies) const = 0;
+
   /// Appends one entry a batch.
   virtual void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const = 0;
 };

@@ -99,6 +99,7 @@ class PotentialField final : public Potential {
   std::uint64_t stiffness_version() const override;
   void append_strains(const Positions& x, std::vector<Real>& strains) const override;
   void append_energies(const Positions& x, std::vector<Real>& energies) const override;
+  void add_particle_energies(const Positions& x, std::span<Real> energies) const override;
   void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
 
  private:

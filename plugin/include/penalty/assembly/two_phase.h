@@ -59,6 +59,7 @@ class TwoPhase final : public Potential {
   // Of both phases, the soft one first; of the one that does not act zeros, and no element enabled.
   void append_strains(const Positions& x, std::vector<Real>& strains) const override;
   void append_energies(const Positions& x, std::vector<Real>& energies) const override;
+  void add_particle_energies(const Positions& x, std::span<Real> energies) const override;
   void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
 
  private:
