@@ -12,7 +12,7 @@ namespace {
 
 const Material jelly{.young = 1e6, .poisson = 0.35, .density = 1000};  // of two phases
 constexpr Real damping = 0.005; // ratio to stiffness [s]
-constexpr Real interval = 1.5;  // from one start to the next [s]
+constexpr Real interval = 2;  // from one start to the next [s]
 constexpr Real recovered_below = 1e-2;  // rest error
 
 constexpr Start sequence[] = {Start::scramble, Start::squash, Start::plane, Start::line,

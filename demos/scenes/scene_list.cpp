@@ -17,7 +17,7 @@ const std::vector<SceneEntry>& scenes() {
       {"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear},
       {"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
        user_constraint_body, user_constraint},
-      {"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 12, recover_body, recover},
+      {"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16, recover_body, recover},
       {"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6, nullptr,
        nullptr, potential_field}};
   return list;

@@ -45,7 +45,7 @@ AffineSpan affine_span(const Positions& points, Real scale) {
 
 Real unfolding_distance(const AffineSpan& rest, Eigen::Index num_points) {
   if (rest.dimension == 0) return 0;
-  return 0.1 * rest.spreads[0] / std::pow(static_cast<Real>(num_points), 1.0 / rest.dimension);
+  return 0.25 * rest.spreads[0] / std::pow(static_cast<Real>(num_points), 1.0 / rest.dimension);
 }
 
 void jitter(PackedVectors& points, std::span<const Real> inverse_masses, Real distance) {

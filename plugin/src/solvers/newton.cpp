@@ -9,6 +9,7 @@ namespace {
 constexpr Real sufficient = 1e-4;     // share of the predicted fall that a step has to keep (Armijo)
 constexpr int most_backtracks = 30;
 constexpr Real round_off = 1e-13;     // of the terms of Phi: below it the slope decides instead
+constexpr Real epsilon = 1e-16;
 
 }  // namespace
 
@@ -95,11 +96,12 @@ void NewtonSolver::assemble() {
     system_.terms.insert(system_.terms.end(), damping_.terms.begin(), damping_.terms.end());
   }
   const int num_particles = matrix.num_particles();
-  Real shift = 0;
-  if (regularization > 0) {
-    for (int i = 0; i < num_particles; ++i) shift += matrix.diagonal(i).trace();
-    shift *= regularization / (3 * num_particles);
-  }
+  Real stiffness = 0;
+  for (int i = 0; i < num_particles; ++i) stiffness += matrix.diagonal(i).trace() / 3;
+  const Real shift = regularization * stiffness / std::max(num_particles, 1);
+  // A turned body has F far from 1, and energies of elements that are small differences of large numbers.
+  const auto x = here_.positions.topRows<3>();
+  energy_noise_ = epsilon * stiffness * (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).squaredNorm();
   for (int i = 0; i < num_particles; ++i) {
     const Real weight = objective.weights.empty() ? 0 : objective.weights[i];
     matrix.add_to_diagonal(i, weight + shift);
@@ -124,7 +126,8 @@ NewtonIteration NewtonSolver::iterate() {
     const Real fall = here_.value - trial_.value;
     const Real new_slope = trial_.gradient.cwiseProduct(direction_).sum();
     const bool falls = fall >= -sufficient * length * slope;
-    const bool flat = std::abs(fall) <= round_off * here_.magnitude && std::abs(new_slope) < -slope;
+    const bool flat =
+        std::abs(fall) <= round_off * here_.magnitude + energy_noise_ && std::abs(new_slope) < -0.9 * slope;
     if (falls || flat) {
       std::swap(here_, trial_);
       iteration.length = length;

@@ -13,6 +13,7 @@ namespace penalty {
 namespace {
 
 bool steps_implicitly(const SteppedBody& body, Real duration) {
+  if (body.particles.size() == 0) return false;
   if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
   return body.options.substeps == 0 &&
          duration * std::sqrt(body.largest_eigenvalue) / 2 > crossover_substeps * body.options.safety;

@@ -17,7 +17,7 @@ struct AffineSpan {
 /// Points that are not finite, or whose squares are not, count as in general position.
 AffineSpan affine_span(const Positions& points, Real scale = 0);
 
-/// How far particles are moved out of a space of fewer dimensions than at rest: a tenth of their mean distance there [m].
+/// How far particles are moved out of a space of fewer dimensions than at rest: a quarter of their mean distance there [m].
 Real unfolding_distance(const AffineSpan& rest, Eigen::Index num_points);
 
 /// Moves every particle but those of zero inverse mass by at most `distance` [m] along each axis, in a direction that its

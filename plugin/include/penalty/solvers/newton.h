@@ -29,7 +29,7 @@ struct NewtonIteration {
 };
 
 /// Minimises by Newton's method: the stiffness of every element is projected on the positive semidefinite matrices, so that
-/// each direction leads downhill, and the line search makes sure that Phi falls. Deterministic, and without allocation
+/// each direction leads downhill, and the line search makes sure that Phi falls, or, where that is lost in round-off, its slope. Deterministic, and without allocation
 /// once the pattern is made, but for elements of many points.
 class NewtonSolver {
  public:
@@ -82,6 +82,7 @@ class NewtonSolver {
   LinearSystem damping_{BlockMatrix(0, {}), {}, {}};
   LinearSolver solver_;
   State here_, trial_;
+  Real energy_noise_ = 0;  // of the potential, a guess [J]
   PackedVectors direction_, displacement_, damping_force_;
 };
 

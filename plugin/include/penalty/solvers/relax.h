@@ -24,7 +24,7 @@ struct RelaxOptions {
   std::vector<int> pinned = {};  // particles that stay where they are
   PackedVectors loads = {}; // constant forces, column i on particle i [N]; empty: none
   /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it by up to
-  /// a tenth of their distance, in directions that their numbers decide: forces alone may not.
+  /// a quarter of their distance, in directions that their numbers decide: forces alone may not.
   bool unfold = true;
   /// Called after every iteration; false ends the relaxation there.
   std::function<bool(const RelaxProgress&)> observe = {};
@@ -49,7 +49,7 @@ struct RelaxReport {
 };
 
 /// Moves `positions`, column i that of particle i [m], to a minimum of the potential, by projected Newton iterations with a line
-/// search: the energy only falls. What is not pinned stays free to turn and drift as a whole. A potential of several
+/// search: the energy only falls, but for round-off. What is not pinned stays free to turn and drift as a whole. A potential of several
 /// phases changes them on the way. The minimum is a local one: of a body at rest the energy is zero, so look at it.
 ///
 /// Throws std::invalid_argument for positions or loads of another size than the field has particles, positions or loads that
