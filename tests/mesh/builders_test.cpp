@@ -58,6 +58,21 @@ TEST(MakeBox, FillsTheBoxWithoutGapsOrOverlap) {
   EXPECT_EQ(mesh.vertices.rowwise().maxCoeff(), Vector3(1, 2, 3));
 }
 
+TEST(MakeBox, SplitsCellsInSixAroundTheirDiagonal) {
+  const TetMesh mesh = make_box({1, 2, 3}, {2, 5, 3}, BoxSplit::six);
+  expect_positive(mesh);
+  EXPECT_EQ(mesh.tetrahedra.size(), 180u);
+  for (const Real v : signed_volumes(mesh.vertices, mesh.tetrahedra)) EXPECT_NEAR(v, 6.0 / 180, 1e-14) << "all are equal";
+  EXPECT_EQ(euler_characteristic(mesh), 1) << "faces match";
+  EXPECT_EQ(boundary_euler_characteristic(mesh), 2);
+  EXPECT_EQ(boundary_faces(mesh.tetrahedra).size(), 4u * (2 * 5 + 5 * 3 + 3 * 2));
+  EXPECT_EQ(mesh.vertices, make_box({1, 2, 3}, {2, 5, 3}).vertices);
+  const TetMesh small = make_box({2, 2, 2}, {2, 2, 2}, BoxSplit::six);
+  EXPECT_EQ(small.tetrahedra.size(), 48u);
+  EXPECT_EQ(small.vertices.cols(), 27);
+  EXPECT_NE(small.source, make_box({2, 2, 2}, {2, 2, 2}).source);
+}
+
 TEST(MakeBox, NumbersSliceBySliceAcrossTheDirectionOfMostCells) {
   for (const std::array<int, 3>& cells : {std::array{9, 2, 3}, std::array{2, 9, 3}, std::array{2, 3, 9}}) {
     const TetMesh mesh = make_box({1, 1, 1}, cells);

@@ -1,8 +1,8 @@
 // What the builders say about their arguments.
 #pragma once
-#include <initializer_list>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "mesh_text.h"
 #include "penalty/mesh/tet_mesh.h"
@@ -20,7 +20,7 @@ inline void require_count(int value, int least, int most, const std::string& nam
                                 " and " + std::to_string(most));
 }
 
-inline std::string call(const std::string& name, std::initializer_list<std::string> arguments) {
+inline std::string call(const std::string& name, const std::vector<std::string>& arguments) {
   std::string text = name + "(";
   for (const std::string& argument : arguments) text += (text.back() == '(' ? "" : ", ") + argument;
   return text + ")";

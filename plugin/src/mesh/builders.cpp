@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "builder_arguments.h"
 #include "icosphere.h"
@@ -21,6 +22,15 @@ namespace {
 //      0-------1
 constexpr Tetrahedron even[5] = {{0, 3, 6, 5}, {1, 0, 5, 3}, {2, 0, 3, 6}, {4, 0, 6, 5}, {7, 3, 5, 6}};
 constexpr Tetrahedron odd[5] = {{1, 2, 4, 7}, {0, 1, 2, 4}, {3, 1, 7, 2}, {5, 1, 4, 7}, {6, 2, 7, 4}};
+
+// The six around the diagonal 0-7: each goes from 0 to 7 along the three axes in one of their orders.
+constexpr Tetrahedron around_diagonal[6] = {{0, 1, 3, 7}, {0, 5, 1, 7}, {0, 3, 2, 7},
+                                            {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 6, 4, 7}};
+
+std::span<const Tetrahedron> cell_tetrahedra(BoxSplit split, bool is_even) {
+  if (split == BoxSplit::six) return around_diagonal;
+  return is_even ? even : odd;
+}
 
 // The builders know the orientation of what they build up to sign: no repair is worth reporting.
 TetMesh finished(TetMesh mesh) {
@@ -62,7 +72,7 @@ struct Disc {
 
 }  // namespace
 
-TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells) {
+TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells, BoxSplit split) {
   constexpr int most_cells = 100'000'000;
   std::int64_t total = 1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -81,10 +91,12 @@ TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells) {
   stride[order[0]] = stride[order[1]] * (cells[order[1]] + 1);
 
   TetMesh mesh;
-  mesh.source = call("make_box", {to_text(size.x()), to_text(size.y()), to_text(size.z()), std::to_string(cells[0]),
-                                  std::to_string(cells[1]), std::to_string(cells[2])});
+  std::vector<std::string> arguments{to_text(size.x()),         to_text(size.y()),         to_text(size.z()),
+                                     std::to_string(cells[0]), std::to_string(cells[1]), std::to_string(cells[2])};
+  if (split == BoxSplit::six) arguments.push_back("six");
+  mesh.source = call("make_box", arguments);
   mesh.vertices.resize(3, Eigen::Index{cells[0] + 1} * (cells[1] + 1) * (cells[2] + 1));
-  mesh.tetrahedra.reserve(static_cast<std::size_t>(5 * total));
+  mesh.tetrahedra.reserve(static_cast<std::size_t>(total) * cell_tetrahedra(split, true).size());
   std::array<int, 3> at;  // of the cell's or vertex's lowest corner
   const auto index = [&](int b) {
     return (at[0] + (b & 1)) * stride[0] + (at[1] + (b >> 1 & 1)) * stride[1] + (at[2] + (b >> 2 & 1)) * stride[2];
@@ -94,7 +106,7 @@ TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells) {
       for (at[order[2]] = 0; at[order[2]] <= cells[order[2]]; ++at[order[2]]) {
         for (int axis = 0; axis < 3; ++axis) mesh.vertices(axis, index(0)) = size[axis] * at[axis] / cells[axis];
         if (at[0] == cells[0] || at[1] == cells[1] || at[2] == cells[2]) continue;
-        for (const Tetrahedron& t : (at[0] + at[1] + at[2]) % 2 == 0 ? even : odd)
+        for (const Tetrahedron& t : cell_tetrahedra(split, (at[0] + at[1] + at[2]) % 2 == 0))
           mesh.tetrahedra.push_back({index(t[0]), index(t[1]), index(t[2]), index(t[3])});
       }
   return finished(std::move(mesh));
