@@ -40,6 +40,7 @@ TEST(Relax, OnlyLowersTheEnergyAndCanBeWatched) {
   options.observe = [&](const RelaxProgress& progress) {
     EXPECT_LE(progress.energy, last + 1e-9) << "round-off of a body of 1 MPa";
     last = progress.energy;
+    EXPECT_DOUBLE_EQ(field.energy(*progress.positions), progress.energy);
     EXPECT_EQ(progress.iteration, static_cast<int>(seen.size()) + 1);
     seen.push_back(progress);
     return true;

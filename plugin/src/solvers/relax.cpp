@@ -107,7 +107,8 @@ RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOp
       report.end = RelaxEnd::no_descent;
       break;
     }
-    if (options.observe && !options.observe({report.iterations, report.energy, report.residual, report.step})) {
+    if (options.observe && !options.observe({report.iterations, report.energy, report.residual, report.step,
+                                             &newton.positions()})) {
       report.end = RelaxEnd::cancelled;
       break;
     }

@@ -14,6 +14,7 @@ struct RelaxProgress {
   Real energy = 0;    // of the potential, less the work of the loads [J]
   Real residual = 0;  // largest force that is not balanced [N]
   Real step = 0;      // largest displacement that Newton's method asked for [m]
+  const PackedVectors* positions = nullptr;  // where the particles are [m]; during the call only
 };
 
 struct RelaxOptions {
