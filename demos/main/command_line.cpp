@@ -49,13 +49,6 @@ std::optional<int> whole(const std::optional<long long>& value, const std::strin
 
 }  // namespace
 
-std::string one_line(std::string what) {
-  while (!what.empty() && what.back() == '\n') what.pop_back();
-  for (char& c : what)
-    if (c == '\n' || c == '\r') c = ' ';
-  return what;
-}
-
 long num_steps(Real duration, Real rate) {
   const Real steps = std::round(duration * rate);
   if (steps < 1)

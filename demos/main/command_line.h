@@ -2,21 +2,15 @@
 #pragma once
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "main/usage_error.h"
 #include "render/context.h"
 #include "render/renderer.h"
 #include "scenes/scene_options.h"
 
 namespace penalty::demo {
-
-/// What the user asked for cannot be had: status 2. what() is one line.
-class UsageError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 enum class Coloring { energy, strain };
 
@@ -46,8 +40,5 @@ CommandLine parse(int argc, const char* const* argv);
 
 /// World steps in a run; throws UsageError if that is none, or more than anybody waits for.
 long num_steps(Real duration, Real rate);
-
-/// `what` without line breaks, so that an error stays one line.
-std::string one_line(std::string what);
 
 }  // namespace penalty::demo
