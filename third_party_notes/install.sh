@@ -8,7 +8,7 @@ say() { echo "install.sh: $*"; }
 build=(g++ cmake ninja-build pkg-config libbullet-dev libeigen3-dev libgtest-dev)  # a plain configure includes the tests
 demos=(libassimp-dev libcli11-dev nlohmann-json3-dev libpng-dev libstb-dev libgl-dev libosmesa6 fonts-dejavu-core ffmpeg
        glmark2-data)
-tests=(libbenchmark-dev libegl1 libgl1-mesa-dri)
+tests=(libbenchmark-dev libegl1 libgl1-mesa-dri parallel)
 
 case "${1:-}" in
   demos) wanted=("${build[@]}" "${demos[@]}") ;;

@@ -10,9 +10,9 @@
 namespace penalty::study {
 
 struct SuiteOptions {
-  std::optional<int> seeds;    // of every random start; empty: as the suite says
-  std::optional<Real> time;    // simulated [s]
-  std::string file_mesh = {};  // name of the user's own mesh, see StudyMeshes; empty: none
+  std::optional<int> seeds = {};  // of every random start; empty: as the suite says
+  std::optional<Real> time = {};  // simulated [s]
+  std::string file_mesh = {};     // name of the user's own mesh, see StudyMeshes; empty: none
 };
 
 struct Suite {

@@ -11,7 +11,7 @@ add_test(NAME readme.every_block_is_marked COMMAND ${penalty_blocks} check)
 function(readme_bash_test name)
   if(TARGET penalty-demo AND TARGET penalty-demo-float64)
     add_test(NAME readme.${name} COMMAND ${CMAKE_COMMAND} -E env
-      "PATH=$<TARGET_FILE_DIR:penalty-demo>:$<TARGET_FILE_DIR:penalty-demo-float64>:$ENV{PATH}"
+      "PATH=$<TARGET_FILE_DIR:penalty-demo>:$<TARGET_FILE_DIR:penalty-study>:$ENV{PATH}"
       ${penalty_blocks} run ${name} ${penalty_readme_work}/${name})
     set_tests_properties(readme.${name} PROPERTIES TIMEOUT 900)
   endif()
