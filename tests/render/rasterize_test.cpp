@@ -30,12 +30,12 @@ class Rasterize : public testing::Test {
 };
 
 TEST_F(Rasterize, FillsARectangleToThePixelAndOnce) {
-  canvas.rectangle(10, 20, 30, 40, {0, 0, 1, 0.5f});
+  canvas.rectangle(10, 20, 30, 40, {0, 0, 1, 0.4f});
   rasterize(canvas, fonts, image);
-  const std::array<int, 3> white{255, 255, 255}, half{128, 128, 255};
+  const std::array<int, 3> white{255, 255, 255}, blue{153, 153, 255};
   for (int y = 18; y < 63; ++y)
     for (int x = 8; x < 43; ++x)
-      ASSERT_EQ(image.pixel(x, y), x >= 10 && x < 40 && y >= 20 && y < 60 ? half : white) << x << ", " << y;
+      ASSERT_EQ(image.pixel(x, y), x >= 10 && x < 40 && y >= 20 && y < 60 ? blue : white) << x << ", " << y;
 }
 
 TEST_F(Rasterize, DrawsLinesOfTheirThickness) {
