@@ -7,7 +7,7 @@
 namespace penalty::study {
 namespace {
 
-constexpr std::string_view scene_name = "flight";  // one free body, of the material "recovering"
+constexpr std::string_view scene_name = "recover";  // one free body, of the material "recovering"
 constexpr Real rate = 60;                          // world steps a second
 constexpr Real early = 5;                          // when a longer run is looked at in between [s]
 
