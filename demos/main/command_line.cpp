@@ -67,7 +67,7 @@ CommandLine parse(int argc, const char* const* argv) {
 
   RunOptions options;
   SceneOptions& scene = options.scene_options;
-  std::string world = "classic", integrator = "auto", start, quality = "preview", backend = "auto", coloring = "energy", model;
+  std::string world = "classic", integrator = "auto", start, quality = "preview", backend = "auto", coloring, model;
   std::optional<long long> seed, seeds, cells, phases, substeps, spheres;
   std::string out;
   bool no_render = false, no_scale = false;
@@ -134,9 +134,11 @@ CommandLine parse(int argc, const char* const* argv) {
   } catch (const std::invalid_argument& error) {
     throw UsageError(one_line(error.what()));
   }
-  if (coloring != "energy" && coloring != "strain")
-    throw UsageError("unknown colouring \"" + coloring + "\", must be one of energy, strain");
-  options.coloring = coloring == "energy" ? Coloring::energy : Coloring::strain;
+  if (run->count("--color") > 0) {
+    if (coloring != "energy" && coloring != "strain")
+      throw UsageError("unknown colouring \"" + coloring + "\", must be one of energy, strain");
+    options.coloring = coloring == "energy" ? Coloring::energy : Coloring::strain;
+  }
 
   require(options.rate > 0 && options.rate <= highest_rate, "--rate", options.rate,
           "positive and at most " + shown(highest_rate) + " Hz");

@@ -26,7 +26,7 @@ struct RunOptions {
   render::Quality quality = render::Quality::preview;
   render::Backend backend = render::Backend::automatic;
   bool render = true;
-  Coloring coloring = Coloring::energy;
+  std::optional<Coloring> coloring;  // empty: as the scene looks best
   std::optional<Real> still;  // [s]
 };
 

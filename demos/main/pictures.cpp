@@ -25,8 +25,9 @@ class Stage {
  public:
   Stage(const Recording& recording, const RunOptions& options, const SceneSetup& setup)
       : recording_(recording), options_(options), setup_(setup), triangles_(setup.body.drawn_triangles()) {
-    colors_.square_root = options.coloring == Coloring::energy;
-    colors_.high = color_range();
+    shows_energy_ = coloring(options, setup) == Coloring::energy;
+    colors_.square_root = shows_energy_;
+    colors_.high = setup.look.color_high && !shows_energy_ ? *setup.look.color_high : color_range();
   }
 
   Frame frame(const FrameRecord& record) const {
@@ -54,13 +55,15 @@ class Stage {
   Overlay overlay(const FrameRecord& record) const {
     Overlay overlay;
     overlay.title = setup_.title;
+    for (const Restart& restart : setup_.restarts)
+      if (restart.time < record.time + 1e-9) overlay.title = setup_.title + ": " + restart.name;
     char time[32];
     std::snprintf(time, sizeof time, "t = %.2f s", record.time);
     overlay.subtitle = {time,
                         setup_.body.is_shell() ? std::to_string(triangles_.size()) + " triangles"
                                                : std::to_string(setup_.body.solid().tetrahedra.size()) + " tetrahedra",
                         std::string(name_of(options_.world)) + " world, " + std::string(bullet_precision())};
-    overlay.color_bar = options_.coloring == Coloring::energy
+    overlay.color_bar = shows_energy_
                             ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() +
                                                    (setup_.body.is_shell() ? "/m²]" : "/m³]"),
                                                unit()}
@@ -94,10 +97,21 @@ class Stage {
   double unit() const { return colors_.high >= 1e6 ? 1e6 : colors_.high >= 1e3 ? 1e3 : 1; }
   std::string unit_name() const { return colors_.high >= 1e6 ? "MJ" : colors_.high >= 1e3 ? "kJ" : "J"; }
 
-  render::Inset curves(Real until) const {
+  /// The largest energy; of a body that is put into impossible shapes, what it has left a moment later.
+  double energy_range() const {
     double high = 0;
-    for (const StepRecord& step : recording_.steps)
+    const Real moment = setup_.restarts.empty() ? 0 : 0.25;  // [s]
+    std::size_t restart = 0;
+    for (const StepRecord& step : recording_.steps) {
+      while (restart + 1 < setup_.restarts.size() && step.time > setup_.restarts[restart + 1].time) ++restart;
+      if (moment > 0 && step.time < setup_.restarts[restart].time + moment) continue;
       high = std::max({high, step.energies.elastic, step.energies.kinetic});
+    }
+    return high;
+  }
+
+  render::Inset curves(Real until) const {
+    const double high = energy_range();
     const double scale = high >= 1e4 ? 1e3 : 1;
     render::Inset inset{.title = scale > 1 ? "energy [kJ]" : "energy [J]", .series = {}};
     render::Series elastic{.name = "elastic", .color = render::palette(1), .x = {}, .y = {}};
@@ -105,7 +119,7 @@ class Stage {
     for (const StepRecord& step : recording_.steps) {
       if (step.time > until + 1e-9) break;
       elastic.x.push_back(step.time);
-      elastic.y.push_back(step.energies.elastic / scale);
+      elastic.y.push_back(std::min<double>(step.energies.elastic, high) / scale);
       kinetic.x.push_back(step.time);
       kinetic.y.push_back(step.energies.kinetic / scale);
     }
@@ -120,6 +134,7 @@ class Stage {
   const SceneSetup& setup_;
   std::vector<Triangle> triangles_;
   render::ColorScale colors_;
+  bool shows_energy_ = true;
 };
 
 render::Metadata metadata(const RunOptions& options, const Recording& recording, const SceneSetup& setup) {
@@ -156,7 +171,15 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
   const bool finest = options.quality == render::Quality::still;
   render::Renderer renderer({.backend = options.backend, .quality = finest ? render::Quality::video : options.quality});
   render::Bounds bounds;
-  for (const FrameRecord& record : recording.frames) bounds.add(bounds_of(stage.frame(record)));
+  if (setup.look.reach) {
+    const Eigen::Matrix3Xd& rest = setup.body.vertices();
+    const Vector3 low = rest.rowwise().minCoeff(), high = rest.rowwise().maxCoeff();
+    const Vector3 middle = (low + high) / 2, half = *setup.look.reach * (high - low) / 2;
+    bounds.add(Vector3(middle - half));
+    bounds.add(Vector3(middle + half));
+  } else {
+    for (const FrameRecord& record : recording.frames) bounds.add(bounds_of(stage.frame(record)));
+  }
   const render::Camera camera = frame_camera(bounds, renderer.aspect(), view);
   render::VideoWriter video(directory / (setup.name + ".mp4"), renderer.width(), renderer.height(),
                             {.frames_per_second = plan.frames_per_second});

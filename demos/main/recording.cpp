@@ -65,6 +65,10 @@ FramePlan plan_frames(Real duration, Real rate) {
   return plan;
 }
 
+Coloring coloring(const RunOptions& options, const SceneSetup& setup) {
+  return options.coloring.value_or(setup.look.strain ? Coloring::strain : Coloring::energy);
+}
+
 Recording record(Scene& scene, const RunOptions& options, long steps, const FramePlan& frames,
                  const std::function<void(long)>& progress) {
   const Real dt = 1 / options.rate;
@@ -101,9 +105,9 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
     angular_scale = std::max(angular_scale, now.angular_scale);
     if (frames.interval > 0 && (time >= next_frame - dt / 4)) {
       recording.frames.push_back({time, scene.particles().positions.topRows<3>(),
-                                  options.coloring == Coloring::energy
+                                  coloring(options, scene.setup()) == Coloring::energy
                                       ? energy_densities(scene, shares)
-                                      : particle_strains(scene.field(), scene.particles().positions),
+                                      : measure.vertex_strains(scene.particles().positions),
                                   scene.objects(), unbroken_triangles(body, scene.field())});
       next_frame += frames.interval;
     }

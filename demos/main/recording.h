@@ -80,6 +80,9 @@ struct FramePlan {
 };
 FramePlan plan_frames(Real duration, Real rate);
 
+/// What the colours of a run show.
+Coloring coloring(const RunOptions& options, const SceneSetup& setup);
+
 /// Runs `scene` from its start. `progress` is told the number of steps done.
 Recording record(Scene& scene, const RunOptions& options, long steps, const FramePlan& frames,
                  const std::function<void(long)>& progress);

@@ -23,20 +23,6 @@ Eigen::VectorXd particle_energies(const PotentialField& field, const Positions& 
   return energies;
 }
 
-Eigen::VectorXd particle_strains(const PotentialField& field, const Positions& x) {
-  Eigen::VectorXd sums = Eigen::VectorXd::Zero(field.num_particles()), counts = sums;
-  for_each_length_batch(field, [&](const Batch<Length>& batch) {
-    std::vector<Real> strains;
-    batch.append_strains(x, strains);
-    for (std::size_t e = 0; e < strains.size(); ++e)
-      for (int i : batch.stencils()[e]) {
-        sums[i] += std::abs(strains[e]);
-        counts[i] += 1;
-      }
-  });
-  return (counts.array() > 0).select(sums.array() / counts.array(), 0);
-}
-
 std::vector<Triangle> unbroken_triangles(const BodyMesh& body, const PotentialField& field) {
   std::set<Edge> broken;
   for_each_length_batch(field, [&](const Batch<Length>& batch) {

@@ -9,9 +9,6 @@ namespace penalty::demo {
 /// which add up to the energy of the field's kinds.
 Eigen::VectorXd particle_energies(const PotentialField& field, const Positions& x);
 
-/// Mean |strain| of the lengths that meet in a particle; 0 where none does.
-Eigen::VectorXd particle_strains(const PotentialField& field, const Positions& x);
-
 /// What is left to draw of the body where lengths broke: its triangles without those that have a broken edge, or the
 /// boundary of its tetrahedra without these. Empty as long as everything holds, and of an embedded surface.
 std::vector<Triangle> unbroken_triangles(const BodyMesh& body, const PotentialField& field);

@@ -34,7 +34,7 @@ struct Tally {
 
 }  // namespace
 
-BodyMesh recover_body(const SceneOptions& options) { return load_body(options, "bunny"); }
+BodyMesh recover_body(const SceneOptions& options) { return load_body(options, "torus"); }
 
 SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
   if (body.is_shell()) throw std::invalid_argument("scene recover needs tetrahedra");
@@ -53,12 +53,13 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
                    .objects = {},
                    .step = step_options(options, {.integrator = Integrator::implicit_step, .damping_time = damping}),
                    .tip = {},
-                   .look = {.azimuth = 20, .elevation = 18, .still_time = 0.15, .wire = true}};
+                   .look = {.azimuth = 20, .elevation = 18, .still_time = 0.1, .strain = true, .color_high = 1, .reach = 1.5}};
   if (options.start) return setup;
 
   std::uint32_t seed = options.seed;
-  for (std::size_t k = 1; k < std::size(sequence); ++k)
-    setup.restarts.push_back({static_cast<Real>(k) * interval, start_positions(rest, sequence[k], ++seed)});
+  for (std::size_t k = 0; k < std::size(sequence); ++k)
+    setup.restarts.push_back({static_cast<Real>(k) * interval, std::string(name_of(sequence[k])),
+                              start_positions(rest, sequence[k], seed++)});
   const auto tally = std::make_shared<Tally>(Tally{ShapeMeasure(rest, body.edges(), body.tetrahedra())});
   setup.watch = [tally](const Positions& x, const PotentialField&, Real time) {
     if (time > static_cast<Real>(tally->starts + 1) * interval - 1e-6) tally->count(x);

@@ -1,6 +1,7 @@
 // A scene before it enters a Bullet world: plain data.
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,11 +19,15 @@ struct Look {
   Real azimuth = 28, elevation = 14;  // [degrees]
   Real still_time = -1;               // [s]; negative: the end
   bool wire = true;                   // the edges of the triangles, but for an embedded surface
+  bool strain = false;                // colours show strain, unless the user says otherwise
+  std::optional<Real> color_high = {};  // top of the colours; empty: what most of the body reaches at some time
+  std::optional<Real> reach = {};       // the clip shows the rest shape, that many times as large; empty: all that moves
 };
 
 /// The body is put somewhere else, at rest.
 struct Restart {
-  Real time;  // [s]
+  Real time;         // [s]
+  std::string name;  // what the picture says from then on
   Eigen::Matrix3Xd positions;
 };
 

@@ -40,6 +40,19 @@ ShapeErrors ShapeMeasure::errors(const Positions& x) const {
   return errors;
 }
 
+Eigen::VectorXd ShapeMeasure::vertex_strains(const Positions& x) const {
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(x.cols()), counts = sums;
+  for (std::size_t e = 0; e < edges_.size(); ++e) {
+    const Vector3 d = (x.col(edges_[e][1]) - x.col(edges_[e][0])).head<3>();
+    const Real strain = std::abs(d.norm() / lengths_[e] - 1);
+    for (const int i : edges_[e]) {
+      sums[i] += strain;
+      counts[i] += 1;
+    }
+  }
+  return (counts.array() > 0).select(sums.array() / counts.array(), 0);
+}
+
 Real ShapeMeasure::rest_error(const Positions& x) const {
   if (!x.allFinite()) return std::numeric_limits<Real>::quiet_NaN();
   const Eigen::Matrix3Xd now = x.topRows<3>();

@@ -21,6 +21,9 @@ class ShapeMeasure {
 
   ShapeErrors errors(const Positions& x) const;
 
+  /// Mean |L - L0| / L0 of the edges that meet in a vertex; 0 where none does.
+  Eigen::VectorXd vertex_strains(const Positions& x) const;
+
   /// Largest distance of a vertex to the rest shape after the best rotation and translation (least squares, never a
   /// reflection), over the diagonal of the rest bounding box.
   Real rest_error(const Positions& x) const;

@@ -53,15 +53,5 @@ TEST(ParticleEnergies, AddUpToTheEnergyOfTheField) {
   EXPECT_NEAR(particle_energies(field, x).sum(), field.energy(x), 1e-12 * field.energy(x));
 }
 
-TEST(ParticleStrains, AreMeansOverTheEdges) {
-  const BodyMesh body = cloth_body({.cells = 4});
-  PotentialField field(body.vertices());
-  field.add<Length>(body.edges(), 1.0);
-  const Eigen::VectorXd strains = particle_strains(field, pack(1.25 * body.vertices()));
-  EXPECT_NEAR(strains.minCoeff(), 0.25, 1e-14);
-  EXPECT_NEAR(strains.maxCoeff(), 0.25, 1e-14);
-  EXPECT_NEAR(body.vertex_shares().sum(), 4, 1e-13) << "of the area";
-}
-
 }  // namespace
 }  // namespace penalty::demo

@@ -62,5 +62,17 @@ TEST(ShapeMeasure, ASheetHasLengthsButNoVolumes) {
   EXPECT_LT(measure.rest_error(pack(rotation * sheet.vertices)), 1e-14) << "flat, and yet there is a best rotation";
 }
 
+TEST(ShapeMeasure, StrainsOfAVertexAreMeansOverItsEdges) {
+  Eigen::Matrix3Xd rest(3, 4);
+  rest << 0, 1, 0, 5,  //
+      0, 0, 2, 5,      //
+      0, 0, 0, 5;
+  const ShapeMeasure measure(rest, std::vector<Edge>{{0, 1}, {0, 2}});
+  PackedVectors x = pack(rest);
+  x(0, 1) = 1.5;
+  x(1, 2) = 1.8;
+  EXPECT_LT((measure.vertex_strains(x) - Eigen::Vector4d(0.3, 0.5, 0.1, 0)).norm(), 1e-15);
+}
+
 }  // namespace
 }  // namespace penalty::demo

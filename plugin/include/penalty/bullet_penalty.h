@@ -1,6 +1,7 @@
 // Everything an application includes to put penalty forces on its Bullet soft bodies.
 #pragma once
 #include "penalty/assembly/potential_field.h"
+#include "penalty/assembly/two_phase.h"
 #include "penalty/bullet/deformable_penalty_force.h"
 #include "penalty/bullet/penalty_deformable_body_solver.h"
 #include "penalty/bullet/penalty_soft_body_solver.h"
@@ -11,3 +12,4 @@
 #include "penalty/mesh/read_mesh.h"
 #include "penalty/mesh/surface_builders.h"
 #include "penalty/mesh/write_mesh.h"
+#include "penalty/solvers/relax.h"
