@@ -12,8 +12,8 @@ Point point_of(const CanvasVertex& vertex) { return {vertex.point[0], vertex.poi
 
 float cross(const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Whether a pixel centre exactly on the edge from `a` to `b` belongs to the triangle on its positive side: of two triangles that
-/// share the edge, to one.
+/// Whether a pixel centre exactly on the edge from `a` to `b` belongs to the triangle on its positive side: of two
+/// triangles that share the edge, to one.
 bool owns_edge(const Point& a, const Point& b) { return b.y() > a.y() || (b.y() == a.y() && b.x() < a.x()); }
 
 /// Bilinear, as a texture is read; s and t from 0 to 1.
@@ -24,7 +24,9 @@ float letter_coverage(const FontAtlas& fonts, float s, float t) {
   const auto at = [&](int column, int row) {
     column = std::clamp(column, 0, side - 1);
     row = std::clamp(row, 0, side - 1);
-    return static_cast<float>(fonts.coverage()[static_cast<std::size_t>(row) * static_cast<std::size_t>(side) + column]) / 255;
+    return static_cast<float>(
+               fonts.coverage()[static_cast<std::size_t>(row) * static_cast<std::size_t>(side) + column]) /
+           255;
   };
   const int i = static_cast<int>(x0), j = static_cast<int>(y0);
   return (1 - v) * ((1 - u) * at(i, j) + u * at(i + 1, j)) + v * ((1 - u) * at(i, j + 1) + u * at(i + 1, j + 1));
@@ -48,7 +50,8 @@ void draw_triangle(const CanvasVertex* corners, const FontAtlas& fonts, Image& i
   if (!(area > 0)) return;
   const Point p[3] = {point_of(*c[0]), point_of(*c[1]), point_of(*c[2])};
   const Point low = p[0].cwiseMin(p[1]).cwiseMin(p[2]), high = p[0].cwiseMax(p[1]).cwiseMax(p[2]);
-  const int x0 = std::max(0, static_cast<int>(std::floor(low.x()))), y0 = std::max(0, static_cast<int>(std::floor(low.y())));
+  const int x0 = std::max(0, static_cast<int>(std::floor(low.x()))),
+            y0 = std::max(0, static_cast<int>(std::floor(low.y())));
   const int x1 = std::min(image.width - 1, static_cast<int>(std::ceil(high.x())));
   const int y1 = std::min(image.height - 1, static_cast<int>(std::ceil(high.y())));
   for (int y = y0; y <= y1; ++y)

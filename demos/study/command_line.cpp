@@ -64,14 +64,19 @@ CommandLine parse(int argc, const char* const* argv) {
   CLI::App* run = app.add_subcommand("run", "Runs what is missing of a suite");
   CLI::App* table = app.add_subcommand("table", "Prints what came of it");
   CLI::App* plot = app.add_subcommand("plot", "Draws recovery rates");
-  CLI::App* stability = app.add_subcommand("stability", "Measures the implicit step with stiff bodies; status 1 if it fails");
+  CLI::App* stability =
+      app.add_subcommand("stability", "Measures the implicit step with stiff bodies; status 1 if it fails");
 
   RunCommand run_command;
   std::string shard = "1/1", out;
   long long jobs = std::max(1u, std::thread::hardware_concurrency()), seeds = 1;
   Real time = 0;
-  run->add_option("--suite", run_command.suite, "One of the suites of `penalty-study list`")->required()->type_name("NAME");
-  run->add_option("--out", out, "Directory of the results; what it holds is not run again")->required()->type_name("DIR");
+  run->add_option("--suite", run_command.suite, "One of the suites of `penalty-study list`")
+      ->required()
+      ->type_name("NAME");
+  run->add_option("--out", out, "Directory of the results; what it holds is not run again")
+      ->required()
+      ->type_name("DIR");
   run->add_option("--jobs", jobs, "Cases at a time; else as many as there are cores")->type_name("N");
   run->add_option("--shard", shard, "The I-th of N parts of the suite")->type_name("I/N");
   run->add_option("--seeds", seeds, "Seeds of every random start, from 1 on; else as the suite says")->type_name("N");

@@ -106,7 +106,8 @@ void draw_row(Canvas& canvas, const Columns& columns, float y, const PlotRow& ro
 void draw(Canvas& canvas, const std::vector<PlotRow>& rows) {
   const Columns columns(canvas, rows);
   canvas.text(margin, 48, "Recovery from hard starts", ink, Align::left, render::Face::title);
-  canvas.text(margin, 76, "Bars: 95 % interval (Wilson) of the rate from random starts, each with its own seed", faint_ink);
+  canvas.text(margin, 76, "Bars: 95 % interval (Wilson) of the rate from random starts, each with its own seed",
+              faint_ink);
   canvas.text(columns.counts + 0.45f * counts_width, head - 6, "random", faint_ink, Align::right);
   canvas.text(columns.counts + counts_width, head - 6, "exact", faint_ink, Align::right);
   float y = head;
@@ -127,7 +128,8 @@ void write_rate_plot(const std::filesystem::path& path, const std::vector<TableR
   if (rows.empty()) throw std::invalid_argument("no results to draw");
   const float units = head + heading_height * static_cast<float>(num_suites(rows)) +
                       row_height * static_cast<float>(rows.size()) + foot;
-  // A canvas shrinks with a low picture: one of the usual height or more does not, and what is too much of it is cut off.
+  // A canvas shrinks with a low picture: one of the usual height or more does not, and what is too much of it is cut
+  // off.
   const float scale = Canvas::scale_for(picture_width, usual_height), lines = std::ceil(units * scale);
   if (lines > most_height) throw std::invalid_argument("too many rows to draw: " + std::to_string(rows.size()));
   const int height = static_cast<int>(lines);

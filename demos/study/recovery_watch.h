@@ -17,7 +17,7 @@ inline Real thread_cpu_seconds() {
 class RecoveryWatch {
  public:
   struct Moment {
-    Real progress = 0;     // iterations or simulated time [s]
+    Real progress = 0;  // iterations or simulated time [s]
     Real cpu_seconds = 0;
   };
 

@@ -96,7 +96,8 @@ void ResultFile::append(const StudyResult& result) {
   const std::string line = to_line(result) + "\n";
   const ssize_t written = write(file_, line.data(), line.size());
   if (written != static_cast<ssize_t>(line.size()))
-    throw std::runtime_error(path_.string() + ": cannot be written: " + (written < 0 ? std::strerror(errno) : "no space"));
+    throw std::runtime_error(path_.string() +
+                             ": cannot be written: " + (written < 0 ? std::strerror(errno) : "no space"));
 }
 
 }  // namespace penalty::study

@@ -5,8 +5,8 @@
 
 namespace penalty::study {
 
-/// On one thread, with everything its own but `body`, the mesh that the case names. What it returns is the same every time,
-/// but for the times of the CPU. Throws std::invalid_argument for names that are none.
+/// On one thread, with everything its own but `body`, the mesh that the case names. What it returns is the same every
+/// time, but for the times of the CPU. Throws std::invalid_argument for names that are none.
 StudyResult run_case(const StudyCase& which, const demo::BodyMesh& body);
 
 // Either kind.

@@ -107,7 +107,7 @@ bool StabilityTable::is_stable() const {
 
 StabilityTable measure_stability(Real flight, Real chain, const std::function<void(Real)>& progress) {
   constexpr int lowest = -2, highest = 8, lowest_of_chain = 2, highest_of_chain = 6;  // powers of ten [J]
-  Real done = 0, total = 0;  // in steps a second
+  Real done = 0, total = 0;                                                           // in steps a second
   for (const Real rate : rates) total += (highest - lowest + 1) * rate;
   StabilityTable table;
   for (int power = lowest; power <= highest; ++power)
@@ -126,9 +126,9 @@ std::string StabilityTable::text() const {
       "     K [J]  rate [Hz]  largest E/E0   end E/E0  dp/p     dL/L     Newton/step  CG/step  finite\n";
   std::array<char, 160> line{};
   for (const FlightResult& f : flights) {
-    std::snprintf(line.data(), line.size(), "%10.0e  %9.0f  %12.9f  %9.3e  %7.1e  %7.1e  %11.2f  %7.1f  %s\n", f.stiffness,
-                  f.rate, f.largest_energy, f.end_energy, f.linear_drift, f.angular_drift, f.newton_iterations,
-                  f.linear_iterations, f.finite ? "yes" : "NO");
+    std::snprintf(line.data(), line.size(), "%10.0e  %9.0f  %12.9f  %9.3e  %7.1e  %7.1e  %11.2f  %7.1f  %s\n",
+                  f.stiffness, f.rate, f.largest_energy, f.end_energy, f.linear_drift, f.angular_drift,
+                  f.newton_iterations, f.linear_iterations, f.finite ? "yes" : "NO");
     text += line.data();
   }
   text +=

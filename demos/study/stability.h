@@ -8,13 +8,14 @@
 
 namespace penalty::study {
 
-/// A cube of 320 tetrahedra and 1 kg that starts stretched 1.6 times, drifting and spinning, free of forces from outside.
+/// A cube of 320 tetrahedra and 1 kg that starts stretched 1.6 times, drifting and spinning, free of forces from
+/// outside.
 struct FlightResult {
-  Real stiffness = 0;        // K of every element [J]
-  Real rate = 0;             // steps a second
-  Real largest_energy = 0;   // elastic and kinetic, over that at the start
-  Real end_energy = 0;       // likewise
-  Real linear_drift = 0, angular_drift = 0;  // change of the momenta, over what they were
+  Real stiffness = 0;                                 // K of every element [J]
+  Real rate = 0;                                      // steps a second
+  Real largest_energy = 0;                            // elastic and kinetic, over that at the start
+  Real end_energy = 0;                                // likewise
+  Real linear_drift = 0, angular_drift = 0;           // change of the momenta, over what they were
   Real newton_iterations = 0, linear_iterations = 0;  // a step
   bool finite = true;
 

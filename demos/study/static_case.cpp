@@ -7,13 +7,21 @@
 namespace penalty::study {
 namespace {
 
+/// More than by default: a body that is merely slow shall not count as one that is stuck.
+constexpr int max_iterations = 2000;
+
 const char* name_of(RelaxEnd end) {
   switch (end) {
-    case RelaxEnd::converged: return "converged";
-    case RelaxEnd::iteration_limit: return "iteration limit";
-    case RelaxEnd::cancelled: return "cancelled";
-    case RelaxEnd::no_descent: return "no descent";
-    case RelaxEnd::not_finite: return "not finite";
+    case RelaxEnd::converged:
+      return "converged";
+    case RelaxEnd::iteration_limit:
+      return "iteration limit";
+    case RelaxEnd::cancelled:
+      return "cancelled";
+    case RelaxEnd::no_descent:
+      return "no descent";
+    case RelaxEnd::not_finite:
+      return "not finite";
   }
   return "";
 }
@@ -30,8 +38,7 @@ StudyResult run_static_case(const StudyCase& which, const demo::BodyMesh& body) 
                      .vertices = static_cast<int>(mesh.vertices.cols()),
                      .tetrahedra = static_cast<int>(mesh.tetrahedra.size())};
   PotentialField field = find_material(which.material).make(mesh);
-  PackedVectors x =
-      pack(demo::start_positions(mesh.vertices, demo::start_from_name(which.start), which.seed));
+  PackedVectors x = pack(demo::start_positions(mesh.vertices, demo::start_from_name(which.start), which.seed));
   const demo::ShapeMeasure measure(mesh.vertices, mesh.tetrahedra);
 
   RecoveryWatch watch;
@@ -42,7 +49,7 @@ StudyResult run_static_case(const StudyCase& which, const demo::BodyMesh& body) 
     watch.see(measure.rest_error(positions), {static_cast<Real>(iteration), now - start - measuring});
     measuring += thread_cpu_seconds() - now;
   };
-  RelaxOptions options;
+  RelaxOptions options{.max_iterations = max_iterations};
   options.observe = [&](const RelaxProgress& progress) {
     see(*progress.positions, progress.iteration);
     return true;

@@ -8,9 +8,9 @@
 namespace penalty::study {
 namespace {
 
-constexpr Real young = 1e5;  // [Pa]
+constexpr Real young = 1e5;            // [Pa]
 constexpr Real spring_poisson = 0.25;  // of springs alone
-constexpr Real volume_share = 0.75;  // K of a volume over mu V_t, on top of springs
+constexpr Real volume_share = 0.75;    // K of a volume over mu V_t, on top of springs
 
 PotentialField recovering(const TetMesh& mesh, Real poisson, ElasticModel model = ElasticModel::neo_hookean) {
   return make_recovering_field(mesh.vertices, mesh.tetrahedra, {.young = young, .poisson = poisson}, model);

@@ -11,13 +11,13 @@ namespace penalty::study {
 struct StudyResult {
   StudyCase which;
   int vertices = 0, tetrahedra = 0;
-  Real rest_error = 0;           // at the end, see ShapeMeasure; NaN if a position is not finite
+  Real rest_error = 0;                        // at the end, see ShapeMeasure; NaN if a position is not finite
   std::optional<Real> rest_error_at_5s = {};  // of a longer run in a world
-  int inverted = 0;              // tetrahedra, at the end
-  std::optional<Real> to_recover = {};  // iterations, or simulated time [s], until recovered for good
-  int iterations = 0;            // Newton's, all in all; steps of the world
-  std::string end = {};          // how a relaxation ended; of a world: "finite" or "not finite"
-  std::string positions_hash = {};  // FNV-1a of the bits of the positions at the end, x y z of each vertex
+  int inverted = 0;                           // tetrahedra, at the end
+  std::optional<Real> to_recover = {};        // iterations, or simulated time [s], until recovered for good
+  int iterations = 0;                         // Newton's, all in all; steps of the world
+  std::string end = {};                       // how a relaxation ended; of a world: "finite" or "not finite"
+  std::string positions_hash = {};            // FNV-1a of the bits of the positions at the end, x y z of each vertex
 
   // What differs from run to run.
   Real cpu_seconds = 0;  // of the thread, without measuring

@@ -80,8 +80,8 @@ std::vector<StudyCase> rate_cases(const SuiteOptions& options) {
   std::vector<StudyCase> cases;
   for (const StudyMaterial& material : study_materials())
     for (const std::string& mesh : meshes)
-      append(cases, one_start(relaxation("rates", std::string(material.name), mesh), "scramble",
-                              options.seeds.value_or(100)));
+      append(cases,
+             one_start(relaxation("rates", std::string(material.name), mesh), "scramble", options.seeds.value_or(100)));
   return cases;
 }
 
@@ -91,8 +91,8 @@ std::vector<StudyCase> world_cases(const SuiteOptions& options) {
   std::vector<StudyCase> cases;
   for (const auto world : {demo::WorldKind::classic, demo::WorldKind::deformable})
     for (const std::string& mesh : meshes)
-      append(cases, every_start(in_world("world", world, mesh, options.time.value_or(world_time)),
-                                options.seeds.value_or(5)));
+      append(cases,
+             every_start(in_world("world", world, mesh, options.time.value_or(world_time)), options.seeds.value_or(5)));
   return cases;
 }
 

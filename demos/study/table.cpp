@@ -41,9 +41,8 @@ std::optional<Real> median(std::vector<Real> values) {
 }
 
 TableRow row_of(const std::vector<const StudyResult*>& group) {
-  TableRow row{.which = group.front()->which,
-               .tetrahedra = group.front()->tetrahedra,
-               .runs = static_cast<int>(group.size())};
+  TableRow row{
+      .which = group.front()->which, .tetrahedra = group.front()->tetrahedra, .runs = static_cast<int>(group.size())};
   std::vector<Real> to_recover, errors, cpu;
   for (const StudyResult* result : group) {
     if (!result->recovered()) continue;

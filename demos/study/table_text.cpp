@@ -64,7 +64,8 @@ std::string table_text(const std::vector<TableRow>& rows, bool times) {
   std::string result;
   for (std::size_t begin = 0, end; begin < rows.size(); begin = end) {
     const std::string& suite = rows[begin].which.suite;
-    Line head{"method", "material", "mesh (tets)", "start", "recovered", "%", "95 % interval", "median", "largest", "error"};
+    Line head{"method", "material",      "mesh (tets)", "start",   "recovered",
+              "%",      "95 % interval", "median",      "largest", "error"};
     if (times) head.insert(head.end(), {"median CPU", "largest CPU"});
     std::vector<Line> lines{head};
     for (end = begin; end < rows.size() && rows[end].which.suite == suite; ++end)

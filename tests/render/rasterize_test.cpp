@@ -13,7 +13,8 @@ constexpr int width = 1280, height = 720;  // a unit of the canvas is a pixel
 
 class Rasterize : public testing::Test {
  protected:
-  Rasterize() : fonts(RendererOptions{}.font_directory, Canvas::text_size, Canvas::title_size), canvas(fonts, width, height) {
+  Rasterize()
+      : fonts(RendererOptions{}.font_directory, Canvas::text_size, Canvas::title_size), canvas(fonts, width, height) {
     std::fill(image.rgb.begin(), image.rgb.end(), std::uint8_t{255});
   }
 

@@ -9,11 +9,11 @@ struct Misuse {
 };
 
 TEST(StudyCommandLine, RefusesWhatItDoesNotKnow) {
-  for (const Misuse& misuse : {Misuse{"", "subcommand"}, Misuse{"bogus", "subcommand"}, Misuse{"run --out x", "--suite"},
-                               Misuse{"run --suite quick", "--out"}, Misuse{"table", "results"},
-                               Misuse{"table nowhere", "nowhere"}, Misuse{"plot nowhere --out x.png", "nowhere"},
-                               Misuse{"plot . --out x.svg", ".png"}, Misuse{"stability --time 0", "--time"},
-                               Misuse{"stability --time nan", "--time"}}) {
+  for (const Misuse& misuse :
+       {Misuse{"", "subcommand"}, Misuse{"bogus", "subcommand"}, Misuse{"run --out x", "--suite"},
+        Misuse{"run --suite quick", "--out"}, Misuse{"table", "results"}, Misuse{"table nowhere", "nowhere"},
+        Misuse{"plot nowhere --out x.png", "nowhere"}, Misuse{"plot . --out x.svg", ".png"},
+        Misuse{"stability --time 0", "--time"}, Misuse{"stability --time nan", "--time"}}) {
     SCOPED_TRACE(misuse.arguments);
     expect_error(run_study(words(misuse.arguments)), 2, misuse.mentions);
   }
@@ -40,11 +40,13 @@ TEST(StudyCommandLine, RefusesImpossibleRuns) {
 TEST(StudyCommandLine, SaysWhatFilesCannotBeUsed) {
   const TemporaryDirectory directory;
   std::ofstream(directory / "file") << "no directory\n";
-  expect_error(run_study({"run", "--suite", "quick", "--out", (directory / "file").string()}), 1, "results-1-of-1.jsonl");
+  expect_error(run_study({"run", "--suite", "quick", "--out", (directory / "file").string()}), 1,
+               "results-1-of-1.jsonl");
   std::ofstream(directory / "results-1-of-1.jsonl") << "{}\n";
   expect_error(run_study({"table", directory.path().string()}), 1, "results-1-of-1.jsonl:1: ");
   std::ofstream(directory / "results-1-of-1.jsonl") << "";
-  expect_error(run_study({"plot", directory.path().string(), "--out", (directory / "x.png").string()}), 1, "no results");
+  expect_error(run_study({"plot", directory.path().string(), "--out", (directory / "x.png").string()}), 1,
+               "no results");
 }
 
 TEST(StudyCommandLine, ListsAndHelps) {

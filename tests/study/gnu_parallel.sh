@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# gnu_parallel.sh STUDY DIR: two workers of GNU parallel share out the suite quick in four parts; the table of their results is that
-# of one go.
+# gnu_parallel.sh STUDY DIR: two workers of GNU parallel share out the suite quick in four parts; the table of their
+# results is that of one go.
 set -euo pipefail
 study=$1
 rm -rf "$2"

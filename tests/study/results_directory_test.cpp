@@ -96,7 +96,9 @@ TEST(Merged, HasEachCaseOnceAndRefusesContradictions) {
   slower.cpu_seconds_to_recover = 8;
   EXPECT_EQ(merged({result_of(1), result_of(2), slower}).size(), 2u);
   slower.positions_hash.back() = '0';
-  EXPECT_EQ(message_of([&] { merged({result_of(1), result_of(2), slower}); }),
+  EXPECT_EQ(message_of([&] {
+              merged({result_of(1), result_of(2), slower});
+            }),
             "two results of world/classic float32 20 s/recovering/box4/scramble/1 contradict each other");
 }
 

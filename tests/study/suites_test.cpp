@@ -37,8 +37,7 @@ TEST(Suites, DrawOnlyRandomStartsAgain) {
   for (const char* exact : {"squash", "plane", "line", "point", "mirror"}) {
     EXPECT_FALSE(is_random(exact));
     int runs = 0;
-    for (const StudyCase& c : find_suite("static").cases({.seeds = 7}))
-      runs += c.start == exact && c.mesh == "box4";
+    for (const StudyCase& c : find_suite("static").cases({.seeds = 7})) runs += c.start == exact && c.mesh == "box4";
     EXPECT_EQ(runs, 1) << exact;
   }
   std::set<std::uint32_t> seeds;
