@@ -69,7 +69,7 @@ TEST(TwoPhase, SaysWhatTheChangeAddsToTheEnergy) {
   const Real before = cube.field.energy(x);
   const Real added = cube.field.choose_phase(x);
   EXPECT_LT(added, 0);
-  EXPECT_EQ(cube.field.energy(x), before + added);
+  EXPECT_DOUBLE_EQ(cube.field.energy(x), before + added);
   EXPECT_EQ(cube.field.choose_phase(x), 0) << "it is soft already";
 }
 
