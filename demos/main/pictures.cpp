@@ -174,9 +174,7 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
   if (setup.look.reach) {
     const Eigen::Matrix3Xd& rest = setup.body.vertices();
     const Vector3 low = rest.rowwise().minCoeff(), high = rest.rowwise().maxCoeff();
-    const Vector3 middle = (low + high) / 2, half = *setup.look.reach * (high - low) / 2;
-    bounds.add(Vector3(middle - half));
-    bounds.add(Vector3(middle + half));
+    bounds.add(Vector3((low + high) / 2), *setup.look.reach * (high - low).norm() / 2);
   } else {
     for (const FrameRecord& record : recording.frames) bounds.add(bounds_of(stage.frame(record)));
   }

@@ -53,7 +53,7 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
                    .objects = {},
                    .step = step_options(options, {.integrator = Integrator::implicit_step, .damping_time = damping}),
                    .tip = {},
-                   .look = {.azimuth = 20, .elevation = 18, .still_time = 0.1, .strain = true, .color_high = 1, .reach = 1.5}};
+                   .look = {.azimuth = 20, .elevation = 18, .still_time = 0.13, .strain = true, .color_high = 1, .reach = 0.85}};
   if (options.start) return setup;
 
   std::uint32_t seed = options.seed;

@@ -21,7 +21,7 @@ struct Look {
   bool wire = true;                   // the edges of the triangles, but for an embedded surface
   bool strain = false;                // colours show strain, unless the user says otherwise
   std::optional<Real> color_high = {};  // top of the colours; empty: what most of the body reaches at some time
-  std::optional<Real> reach = {};       // the clip shows the rest shape, that many times as large; empty: all that moves
+  std::optional<Real> reach = {};       // the clip shows a ball about the rest shape, that many times as large; empty: all that moves
 };
 
 /// The body is put somewhere else, at rest.

@@ -1,5 +1,7 @@
 #include "penalty/math/affine_span.h"
 
+#include <Eigen/LU>
+#include <cmath>
 #include <vector>
 
 #include "math/random.h"
@@ -61,6 +63,46 @@ TEST(Jitter, IsTheSameEveryTimeSmallAndInNoPlane) {
   // Uniform in [-1, 1) has a standard deviation of 1/sqrt(3); of a thousand the estimate is good to some 2 %.
   for (const Real spread : span.spreads) EXPECT_NEAR(spread, 0.25 / std::sqrt(3.0), 0.01);
   EXPECT_LT(once.topRows<3>().rowwise().mean().cwiseAbs().maxCoeff(), 0.02);
+}
+
+TEST(Unfold, LeadsOutOfEveryFlatStateWithoutTurningAnElementInsideOut) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const PackedVectors rest = pack(random.vectors<Eigen::Dynamic>(40, 1));
+    const AffineSpan span = affine_span(rest);
+    const std::vector<Real> inverse_masses(40, 1);
+    for (const int dimension : {0, 1, 2}) {
+      const Matrix3 rotation = random.rotation();
+      const Vector3 kept(dimension > 0, dimension > 1, 0), shift = random.vector(5);
+      PackedVectors x = pack((rotation * kept.asDiagonal() * rest.topRows<3>()).colwise() + shift);
+      EXPECT_TRUE(unfold(x, rest, span, inverse_masses));
+      EXPECT_EQ(affine_span(x, span.spreads[0]).dimension, 3);
+      // The affine map from rest, by least squares: it keeps the orientation. The rotation that fits best is not quite that of
+      // the flat state, unless the points spread evenly, so the volume is not exactly that of the two added up.
+      const Eigen::Matrix3Xd from = rest.topRows<3>().colwise() - rest.topRows<3>().rowwise().mean();
+      const Eigen::Matrix3Xd to = x.topRows<3>().colwise() - x.topRows<3>().rowwise().mean();
+      const Matrix3 map = to * from.transpose() * (from * from.transpose()).inverse();
+      const Real added_up = std::pow(1.1, dimension) * std::pow(0.1, 3 - dimension);
+      EXPECT_NEAR(map.determinant(), added_up, 0.1 * added_up);
+      EXPECT_FALSE(unfold(x, rest, span, inverse_masses)) << "once is enough";
+    }
+  }
+}
+
+TEST(Unfold, LeavesAloneWhatIsFlatAtRestAndWhatIsPinned) {
+  Random random(1);
+  Eigen::Matrix3Xd sheet = random.vectors<Eigen::Dynamic>(20, 1);
+  sheet.row(2).setZero();
+  PackedVectors x = pack(sheet);
+  const PackedVectors before = x;
+  std::vector<Real> inverse_masses(20, 1);
+  EXPECT_FALSE(unfold(x, before, affine_span(before), inverse_masses));
+  EXPECT_EQ(x, before);
+  const PackedVectors rest = pack(random.vectors<Eigen::Dynamic>(20, 1));
+  inverse_masses[4] = 0;
+  EXPECT_TRUE(unfold(x, rest, affine_span(rest), inverse_masses));
+  EXPECT_EQ(x.col(4), before.col(4));
 }
 
 }  // namespace

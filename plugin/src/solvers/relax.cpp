@@ -59,13 +59,9 @@ RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOp
   std::sort(pinned.begin(), pinned.end());
   pinned.erase(std::unique(pinned.begin(), pinned.end()), pinned.end());
   if (options.unfold) {
-    const AffineSpan span = affine_span(rest);
-    if (affine_span(positions, span.spreads[0]).dimension < span.dimension) {
-      std::vector<Real> inverse_masses(static_cast<std::size_t>(rest.cols()), 1);
-      for (const int i : pinned) inverse_masses[static_cast<std::size_t>(i)] = 0;
-      jitter(positions, inverse_masses, unfolding_distance(span, rest.cols()));
-      report.unfolded = true;
-    }
+    std::vector<Real> inverse_masses(static_cast<std::size_t>(rest.cols()), 1);
+    for (const int i : pinned) inverse_masses[static_cast<std::size_t>(i)] = 0;
+    report.unfolded = unfold(positions, rest, affine_span(rest), inverse_masses);
   }
 
   NewtonSolver newton;

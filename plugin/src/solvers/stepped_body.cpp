@@ -8,16 +8,6 @@
 namespace penalty {
 namespace {
 
-/// Moves the particles of a body out of a space of fewer dimensions than it has at rest.
-bool unfold(SteppedBody& body) {
-  const AffineSpan& rest = body.rest_span;
-  if (!body.options.unfold || rest.dimension == 0) return false;
-  if (affine_span(body.particles.positions, rest.spreads[0]).dimension >= rest.dimension) return false;
-  jitter(body.particles.positions, body.particles.inverse_masses, unfolding_distance(rest, body.particles.size()));
-  body.positions_changed();
-  return true;
-}
-
 int first_not_finite(const Particles& particles) {
   for (int i = 0; i < particles.size(); ++i)
     if (!particles.positions.col(i).allFinite() || !particles.velocities.col(i).allFinite()) return i;
@@ -49,7 +39,9 @@ Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Re
 
 Real begin_step(SteppedBody& body) {
   body.report = {};
-  body.report.unfolded = unfold(body);
+  body.report.unfolded = body.options.unfold && unfold(body.particles.positions, body.rest_positions, body.rest_span,
+                                                       body.particles.inverse_masses);
+  if (body.report.unfolded) body.positions_changed();
   if (body.potential->choose_phase(body.particles.positions) != 0) body.positions_changed();
   body.start.positions = body.particles.positions;
   body.start.velocities = body.particles.velocities;
@@ -113,6 +105,7 @@ void estimate_stability(SteppedBody& body, const Positions& rest_positions) {
   for (const Real inverse_mass : body.particles.inverse_masses) body.mass += inverse_or_zero(inverse_mass);
   const auto points = rest_positions.topRows<3>();
   const Real extent2 = points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
+  body.rest_positions = rest_positions;
   body.rest_span = affine_span(rest_positions);
   body.energy_noise = 1e-15 * body.mass * body.largest_eigenvalue * extent2;
 }

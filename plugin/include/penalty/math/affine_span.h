@@ -17,11 +17,15 @@ struct AffineSpan {
 /// Points that are not finite, or whose squares are not, count as in general position.
 AffineSpan affine_span(const Positions& points, Real scale = 0);
 
-/// How far particles are moved out of a space of fewer dimensions than at rest: a quarter of their mean distance there [m].
-Real unfolding_distance(const AffineSpan& rest, Eigen::Index num_points);
-
 /// Moves every particle but those of zero inverse mass by at most `distance` [m] along each axis, in a direction that its
 /// number alone decides.
 void jitter(PackedVectors& points, std::span<const Real> inverse_masses, Real distance);
+
+/// If the points span fewer dimensions than `rest`, whose span is `rest_span`, adds a tenth of the rest shape to them, turned
+/// as it fits best, and a jitter of a thousandth of the mean distance of its points: the way out of a plane, a line or a
+/// point on which no two elements disagree which side is up. Returns whether it did. One column a point in all arrays;
+/// points of zero inverse mass stay.
+bool unfold(PackedVectors& points, const Positions& rest, const AffineSpan& rest_span,
+            std::span<const Real> inverse_masses);
 
 }  // namespace penalty

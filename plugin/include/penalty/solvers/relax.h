@@ -24,8 +24,8 @@ struct RelaxOptions {
   LinearOptions linear = {};
   std::vector<int> pinned = {};  // particles that stay where they are
   PackedVectors loads = {}; // constant forces, column i on particle i [N]; empty: none
-  /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it by up to
-  /// a quarter of their distance, in directions that their numbers decide: forces alone may not.
+  /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it, see
+  /// penalty::unfold: forces alone may not.
   bool unfold = true;
   /// Called after every iteration; false ends the relaxation there.
   std::function<bool(const RelaxProgress&)> observe = {};
