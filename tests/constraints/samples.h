@@ -1,6 +1,7 @@
 // Random elements of any kind: at rest, stretched, compressed, inverted, somewhere else; of any size and anywhere.
 #pragma once
 #include <stdexcept>
+#include <tuple>
 
 #include "math/random.h"
 #include "penalty/constraints/kinds.h"
@@ -36,6 +37,19 @@ inline constexpr bool conserves_momentum = [] {
   else
     return true;
 }();
+
+/// The kinds that nothing outside holds.
+template <class List>
+struct InternalTypesOf;
+template <class... Kinds>
+struct InternalTypesOf<KindList<Kinds...>> {
+  template <class... Types>
+  static ::testing::Types<Types...> listed(std::tuple<Types...>);
+  template <class Kind>
+  using Kept = std::conditional_t<conserves_momentum<Kind>, std::tuple<Kind>, std::tuple<>>;
+  using type = decltype(listed(std::tuple_cat(std::declval<Kept<Kinds>>()...)));
+};
+using InternalKindTypes = InternalTypesOf<AllKinds>::type;
 
 /// The same element elsewhere: what a kind holds besides its points moves with them.
 template <Constraint Kind>

@@ -1,28 +1,6 @@
 // advance() allocates in its first step only: every allocation of this program is counted.
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
+#include "math/allocations.h"
 #include "solvers/islands.h"
-
-static std::atomic<long> num_allocations{0};
-
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
-// Eigen calls malloc itself, and operator new ends there too.
-extern "C" void* __libc_malloc(std::size_t size);
-extern "C" void* malloc(std::size_t size) noexcept {
-  ++num_allocations;
-  return __libc_malloc(size);
-}
-#else
-void* operator new(std::size_t size) {
-  ++num_allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-#endif
 
 namespace penalty::testing {
 namespace {

@@ -188,72 +188,11 @@ void AttachedBodies::World::attach(btSoftBody& body, PotentialField field, const
   }
 }
 
-void AttachedBodies::World::wake(const AttachedCoupling& coupling) {
-  for (const CouplingPoint& point : coupling.points) {
-    if (point.soft_body) get(*point.soft_body).body->activate(true);
-    if (point.rigid_body) point.rigid_body->activate();
-  }
-}
-
 void AttachedBodies::World::detach(const btSoftBody& body) {
   for (const auto& coupling : couplings_)
     if (coupling->holds(body)) wake(*coupling);
   std::erase_if(couplings_, [&](const auto& coupling) { return coupling->holds(body); });
   bodies_.erase(&body);
-}
-
-bool AttachedCoupling::holds(const btSoftBody& body) const {
-  return std::any_of(points.begin(), points.end(), [&](const CouplingPoint& point) { return point.soft_body == &body; });
-}
-
-int AttachedBodies::World::couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time) {
-  if (static_cast<int>(points.size()) != field.num_particles())
-    throw std::invalid_argument("couple: the field has " + std::to_string(field.num_particles()) + " particles for " +
-                                std::to_string(points.size()) + " points");
-  if (!(damping_time >= 0) || !std::isfinite(damping_time))
-    throw std::invalid_argument("couple: damping_time is " + to_text(damping_time) + ", must be zero or positive [s]");
-  bool any_soft = false;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const auto fail = [&](const std::string& what) {
-      throw std::invalid_argument("couple: point " + std::to_string(k) + ": " + what);
-    };
-    const CouplingPoint& point = points[k];
-    if (!point.soft_body == !point.rigid_body) fail("must be of one body, soft or rigid");
-    if (point.soft_body) {
-      any_soft = true;
-      const AttachedBody* attached = find(*point.soft_body);
-      if (!attached) fail("its soft body is not attached");
-      if (point.node < 0 || point.node >= attached->stepped.particles.size())
-        fail("node " + std::to_string(point.node) + " is outside the " +
-             std::to_string(attached->stepped.particles.size()) + " of its body");
-    } else {
-      if (!point.rigid_body->getBroadphaseHandle()) fail("its rigid body is in no world");
-      if (!point.anchor.allFinite()) fail("its anchor is not finite");
-    }
-    for (std::size_t l = 0; l < k; ++l)
-      if (point.soft_body && points[l].soft_body == point.soft_body && points[l].node == point.node)
-        fail("node " + std::to_string(point.node) + " is point " + std::to_string(l) + " already");
-  }
-  if (!any_soft) throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
-  auto coupling = std::make_unique<AttachedCoupling>(next_coupling_++, std::move(points), std::move(field));
-  coupling->stepped.potential = &coupling->field;
-  coupling->stepped.damping_time = damping_time;
-  coupling->stepped.points.resize(coupling->points.size());
-  wake(*coupling);
-  couplings_.push_back(std::move(coupling));
-  return couplings_.back()->number;
-}
-
-AttachedCoupling& AttachedBodies::World::coupling(int number) {
-  for (const auto& coupling : couplings_)
-    if (coupling->number == number) return *coupling;
-  throw std::invalid_argument("there is no coupling " + std::to_string(number));
-}
-
-void AttachedBodies::World::uncouple(int number) {
-  const AttachedCoupling& gone = coupling(number);
-  wake(gone);
-  std::erase_if(couplings_, [&](const auto& coupling) { return coupling.get() == &gone; });
 }
 
 }  // namespace penalty

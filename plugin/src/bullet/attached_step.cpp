@@ -230,47 +230,6 @@ void AttachedBodies::World::wake_if_hit(btSoftBody& body) {
   }
 }
 
-// Coupled bodies sleep together or not at all: while one is restless, those that want to sleep stay awake, and keep the time
-// that they have been at rest, so that all fall asleep when the last of them may. Chains of couplings take several passes.
-void AttachedBodies::World::wake_coupled() {
-  const auto object_of = [this](const CouplingPoint& point) -> btCollisionObject& {
-    if (point.soft_body) return *get(*point.soft_body).body;
-    if (!point.rigid_body->getBroadphaseHandle())
-      throw std::logic_error("a coupled rigid body has left the world: uncouple it first");
-    return *point.rigid_body;
-  };
-  const auto can_sleep = [](const btCollisionObject& object) {
-    return !object.isStaticOrKinematicObject() && (object.getActivationState() == WANTS_DEACTIVATION ||
-                                                   object.getActivationState() == ISLAND_SLEEPING);
-  };
-  const auto is_restless = [&](const btCollisionObject& object) {
-    const btRigidBody* body = btRigidBody::upcast(&object);
-    if (body && body->isStaticOrKinematicObject())
-      return body->isKinematicObject() && !(body->getLinearVelocity().isZero() && body->getAngularVelocity().isZero());
-    return object.isActive() && !can_sleep(object);
-  };
-  bool changed = true;
-  while (changed) {
-    changed = false;
-    for (const auto& coupling : couplings_) {
-      bool restless = false, active = false;
-      for (const CouplingPoint& point : coupling->points) {
-        const btCollisionObject& object = object_of(point);
-        restless = restless || is_restless(object);
-        active = active || (object.isActive() && !object.isStaticOrKinematicObject());
-      }
-      if (!restless && !active) continue;
-      for (const CouplingPoint& point : coupling->points) {
-        btCollisionObject& object = object_of(point);
-        const int wanted = restless ? ACTIVE_TAG : WANTS_DEACTIVATION;
-        if (!can_sleep(object) || object.getActivationState() == wanted) continue;
-        object.forceActivationState(wanted);
-        changed = true;
-      }
-    }
-  }
-}
-
 void AttachedBodies::World::absorb(Island& into, Island& from) {
   std::vector<int> renumbered;
   for (const TouchedRigidBody& touched : from.touched) {
@@ -285,37 +244,6 @@ void AttachedBodies::World::absorb(Island& into, Island& from) {
   }
   into.couplings.insert(into.couplings.end(), from.couplings.begin(), from.couplings.end());
   from = {};
-}
-
-// Brings the bodies of each coupling that is awake into one island. A coupling to a soft body that the application has
-// switched off rests.
-void AttachedBodies::World::join_coupled(Real duration, bool gravity_applied) {
-  const auto island_of = [this](const SteppedBody& body) {
-    return std::find_if(islands_.begin(), islands_.end(), [&](const Island& island) {
-      return std::find(island.bodies.begin(), island.bodies.end(), &body) != island.bodies.end();
-    });
-  };
-  for (const auto& coupling : couplings_) {
-    const auto home = std::find_if(coupling->points.begin(), coupling->points.end(),
-                                   [](const CouplingPoint& point) { return point.soft_body; });
-    const auto island = island_of(get(*home->soft_body).stepped);
-    if (island == islands_.end()) continue;
-    const bool complete = std::all_of(coupling->points.begin(), coupling->points.end(), [&](const CouplingPoint& point) {
-      return !point.soft_body || get(*point.soft_body).body->isActive();
-    });
-    if (!complete) continue;
-    for (const CouplingPoint& point : coupling->points) {
-      if (point.rigid_body) {
-        touch(*point.rigid_body, false, *island, duration, gravity_applied);
-        continue;
-      }
-      const auto other = island_of(get(*point.soft_body).stepped);
-      if (other == islands_.end())
-        throw std::logic_error("a coupled soft body is not in the world of the others: uncouple it first");
-      if (other != island) absorb(*island, *other);
-    }
-    island->couplings.push_back(coupling.get());
-  }
 }
 
 // Bodies that touch the same movable rigid body are stepped together.
