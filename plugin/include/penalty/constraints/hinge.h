@@ -16,10 +16,10 @@ namespace penalty::detail {
 ///
 /// Since (N_A x N_B) . e = -|e|² a . (b x e), the sine needs one triple product only, and its sign is that of minus the
 /// volume of the tetrahedron p0 p1 p2 p3.
-struct Hinge {
+struct FoldedEdge {
   Triple edge, a, b, normal_a, normal_b;
 
-  explicit Hinge(const Points<4>& p)
+  explicit FoldedEdge(const Points<4>& p)
       : edge(Triple::column(p, 1) - Triple::column(p, 0)),
         a(Triple::column(p, 2) - Triple::column(p, 0)),
         b(Triple::column(p, 3) - Triple::column(p, 0)),
@@ -99,5 +99,42 @@ inline Real wrapped_difference(Real angle, Real rest_angle) {
   if (difference <= -std::numbers::pi) return difference + 2 * std::numbers::pi;
   return difference;
 }
+
+/// The kinds that measure a folded edge: C is the angle less the rest angle, wrapped to (-pi, pi]. `Kind` has a name and
+/// `angle_of(edge)`, which differs from theta by a constant or not at all.
+template <class Kind>
+struct AngleAboutEdge {
+  static constexpr int num_points = 4;
+  static constexpr Real period = 2 * std::numbers::pi;  // of C: targets are taken the shorter way round
+
+  /// Throws std::invalid_argument for a wing without an area.
+  static Kind at_rest(const Points<4>& rest) {
+    const FoldedEdge edge(rest);
+    edge.require_wings(Kind::name);
+    Kind kind;
+    kind.rest_angle = Kind::angle_of(edge);
+    return kind;
+  }
+
+  static Real angle(const Points<4>& p) { return Kind::angle_of(FoldedEdge(p)); }
+
+  Real value(const Points<4>& p) const { return wrapped_difference(angle(p), rest_angle); }
+
+  Gradient<4> gradient(const Points<4>& p) const {
+    Gradient<4> g;
+    FoldedEdge(p).gradient(g);
+    return g;
+  }
+
+  Real value_and_gradient(const Points<4>& p, Gradient<4>& g) const {
+    const FoldedEdge edge(p);
+    edge.gradient(g);
+    return wrapped_difference(Kind::angle_of(edge), rest_angle);
+  }
+
+  Hessian<4> hessian(const Points<4>& p) const { return FoldedEdge(p).hessian(); }
+
+  Real rest_angle = 0;  // in (-pi, pi]
+};
 
 }  // namespace penalty::detail
