@@ -12,9 +12,9 @@ namespace penalty::demo {
 namespace {
 
 /// Names of batches as they head a column: without white space, and none twice.
-std::vector<std::string> column_names(const std::vector<BatchRecord>& batches) {
+std::vector<std::string> column_names(const std::vector<LedgerEntry>& batches) {
   std::vector<std::string> names;
-  for (const BatchRecord& batch : batches) {
+  for (const LedgerEntry& batch : batches) {
     std::string name = batch.name;
     for (char& c : name)
       if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
@@ -32,7 +32,7 @@ void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>&
   file.precision(10);
   file << "time,elastic,kinetic,rigid_kinetic,gravitational,total,length_error_mean,length_error_max,volume_error_mean,"
           "volume_error_max,inverted,penetration,contact_depth,substeps,retries,milliseconds,tip_drop";
-  for (const EnergyFlow& flow : energy_flows) file << ',' << flow.name;
+  for (const EnergyFlows::Part& flow : EnergyFlows::parts()) file << ',' << flow.name;
   if (!steps.empty())
     for (const std::string& name : column_names(steps.front().batches))
       file << ',' << name << "_energy," << name << "_strain_mean," << name << "_strain_max";
@@ -43,8 +43,8 @@ void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>&
          << e.total() << ',' << s.errors.length_mean << ',' << s.errors.length_max << ',' << s.errors.volume_mean << ','
          << s.errors.volume_max << ',' << s.errors.inverted << ',' << s.penetration << ',' << s.contact_depth << ','
          << s.substeps << ',' << s.retries << ',' << s.milliseconds << ',' << s.tip_drop.value_or(0);
-    for (const EnergyFlow& flow : energy_flows) file << ',' << s.flows.*flow.member;
-    for (const BatchRecord& b : s.batches) file << ',' << b.energy << ',' << b.strain_mean << ',' << b.largest_strain;
+    for (const EnergyFlows::Part& flow : EnergyFlows::parts()) file << ',' << s.flows.*flow.member;
+    for (const LedgerEntry& b : s.batches) file << ',' << b.energy << ',' << b.mean_strain << ',' << b.largest_strain;
     file << '\n';
   }
   file.close();

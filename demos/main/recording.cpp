@@ -23,14 +23,6 @@ Eigen::VectorXd energy_densities(const Scene& scene, const Eigen::VectorXd& shar
   return (shares.array() > 0).select(energies.array() / shares.array(), 0);
 }
 
-std::vector<BatchRecord> batch_records(const Scene& scene) {
-  std::vector<BatchRecord> batches;
-  for (const LedgerEntry& entry : scene.ledger())
-    batches.push_back({std::string(entry.name), entry.num_elements, entry.num_enabled, entry.energy, entry.mean_strain,
-                       entry.largest_strain});
-  return batches;
-}
-
 std::string failure_message(const Scene& scene, long step, Real time) {
   std::ostringstream text;
   const int particle = scene.report().first_bad_particle;
@@ -95,7 +87,7 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
                       .newton_iterations = report.newton_iterations,
                       .milliseconds = milliseconds,
                       .tip_drop = scene.tip_drop(),
-                      .batches = batch_records(scene),
+                      .batches = scene.ledger(),
                       .flows = scene.flows()};
     recording.steps.push_back(std::move(record));
     const Momenta now = scene.momenta();

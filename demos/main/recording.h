@@ -9,14 +9,6 @@
 
 namespace penalty::demo {
 
-/// One batch of elements after a step, or at the start.
-struct BatchRecord {
-  std::string name;
-  std::size_t elements = 0, enabled = 0;
-  Real energy = 0;                           // [J]
-  Real strain_mean = 0, largest_strain = 0;  // of |strain|
-};
-
 /// After a step, or at the start.
 struct StepRecord {
   Real time = 0;  // [s]
@@ -28,25 +20,9 @@ struct StepRecord {
   int substeps = 0, retries = 0, newton_iterations = 0;
   Real milliseconds = 0;             // CPU time of the world step
   std::optional<Real> tip_drop;      // [m]
-  std::vector<BatchRecord> batches;  // in the order of the field
+  std::vector<LedgerEntry> batches;  // in the order of the field
   EnergyFlows flows;                 // of the soft body, since the start
 };
-
-/// The parts of EnergyFlows by name, as tables and summaries give them.
-struct EnergyFlow {
-  const char* name;
-  Real EnergyFlows::*member;
-};
-inline constexpr EnergyFlow energy_flows[] = {{"constant_forces", &EnergyFlows::constant_forces},
-                                              {"contacts", &EnergyFlows::contacts},
-                                              {"couplings", &EnergyFlows::couplings},
-                                              {"driving", &EnergyFlows::driving},
-                                              {"changes", &EnergyFlows::changes},
-                                              {"damping", &EnergyFlows::damping},
-                                              {"drag", &EnergyFlows::drag},
-                                              {"inelastic", &EnergyFlows::inelastic},
-                                              {"integration", &EnergyFlows::integration},
-                                              {"contact_loss", &EnergyFlows::contact_loss}};
 
 /// What a picture needs.
 struct FrameRecord {

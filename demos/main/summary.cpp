@@ -43,13 +43,13 @@ Json energy_summary(const std::vector<Real>& energies) {
 /// What each batch holds at the end, and what came and went in the course of the run.
 Json ledger_summary(const std::vector<StepRecord>& steps) {
   Json batches = Json::array(), flows;
-  for (const BatchRecord& b : steps.back().batches)
+  for (const LedgerEntry& b : steps.back().batches)
     batches.push_back({{"name", b.name},
-                       {"elements", b.elements},
-                       {"enabled", b.enabled},
+                       {"elements", b.num_elements},
+                       {"enabled", b.num_enabled},
                        {"energy", number(b.energy)},
-                       {"strain", {{"mean", number(b.strain_mean)}, {"max", number(b.largest_strain)}}}});
-  for (const EnergyFlow& flow : energy_flows) flows[flow.name] = number(steps.back().flows.*flow.member);
+                       {"strain", {{"mean", number(b.mean_strain)}, {"max", number(b.largest_strain)}}}});
+  for (const EnergyFlows::Part& flow : EnergyFlows::parts()) flows[std::string(flow.name)] = number(steps.back().flows.*flow.member);
   return {{"batches", batches}, {"flows", flows}, {"residual", number(ledger_residual(steps))}};
 }
 

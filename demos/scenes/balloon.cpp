@@ -50,8 +50,6 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, Real re
           {"pressure_of_skin", skin_pressure(rest_area, rest, volume)}};
 }
 
-}  // namespace
-
 BodyMesh balloon_body(const SceneOptions& options) {
   refuse_mesh(options, "balloon");
   refuse_model(options, "balloon");
@@ -92,5 +90,10 @@ SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
       .facts = [rest_area = area(body.shell())](
                    const Positions& x, const PotentialField& elements) { return facts(x, elements, rest_area); }};
 }
+
+}  // namespace
+
+const SceneEntry balloon_scene{"balloon", "a balloon is blown up until it encloses two and a half times its volume", 4,
+                               balloon_body, balloon};
 
 }  // namespace penalty::demo

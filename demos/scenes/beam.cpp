@@ -26,8 +26,6 @@ PotentialField reference_field(const TetMesh& mesh, Real cell) {
   return field;
 }
 
-}  // namespace
-
 BodyMesh beam_body(const SceneOptions& options) {
   refuse_mesh(options, "beam");
   const int cells = options.cells.value_or(32);
@@ -69,5 +67,10 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
           .tip = tip,
           .look = {.azimuth = 24, .elevation = 12, .still_time = 0.5}};  // when it hangs deepest
 }
+
+}  // namespace
+
+const SceneEntry beam_scene{"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2,
+                            beam_body, beam};
 
 }  // namespace penalty::demo

@@ -17,8 +17,6 @@ constexpr int pleats = 8;                                         // of the star
 constexpr Real damping = 0.01;                                    // [s]
 constexpr Real ball_radius = 0.25, ball_mass = 1.5, fall = 0.55;  // [m], [kg], [m]
 
-}  // namespace
-
 BodyMesh cloth_body(const SceneOptions& options) {
   refuse_mesh(options, "cloth");
   refuse_model(options, "cloth");
@@ -81,5 +79,9 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
             return {{"sag", height - x.row(1).minCoeff()}};
           }};
 }
+
+}  // namespace
+
+const SceneEntry cloth_scene{"cloth", "a sheet, held at its corners, catches a ball", 4, cloth_body, cloth};
 
 }  // namespace penalty::demo

@@ -37,8 +37,6 @@ std::vector<RigidObject> scattered(int count, Real density, std::uint32_t seed) 
   return balls;
 }
 
-}  // namespace
-
 BodyMesh drop_body(const SceneOptions& options) { return load_body(options, "bunny"); }
 
 SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
@@ -65,5 +63,10 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
           .tip = {},
           .look = {.still_time = 0.76}};  // on the ground, flattest
 }
+
+}  // namespace
+
+const SceneEntry drop_scene{"drop", "a mesh, by default the Stanford bunny, falls on the ground among rigid balls", 3,
+                            drop_body, drop};
 
 }  // namespace penalty::demo

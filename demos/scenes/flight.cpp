@@ -10,8 +10,6 @@ constexpr Real stretch = 1.2;        // along x
 constexpr Real safety = 0.4;         // small substeps: the energy then swings by less than it is plotted with
 constexpr Real hard_damping = 0.01;  // of a start far from rest, which otherwise would never find back [s]
 
-}  // namespace
-
 BodyMesh flight_body(const SceneOptions& options) { return load_body(options, "torus"); }
 
 SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
@@ -42,5 +40,9 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
           .tip = {},
           .look = {.azimuth = 20, .elevation = 32}};
 }
+
+}  // namespace
+
+const SceneEntry flight_scene{"flight", "a stretched, spinning body flies freely", 10, flight_body, flight};
 
 }  // namespace penalty::demo

@@ -29,8 +29,6 @@ Real wanted_strain(Real x, Real time) {
   return -contraction * onset * (1 + wave) / 2;
 }
 
-}  // namespace
-
 BodyMesh muscle_body(const SceneOptions& options) {
   refuse_mesh(options, "muscle");
   const int cells = cells_in(options, 28, 8, 100), across = std::max(2, cells / 7);
@@ -86,5 +84,10 @@ SceneSetup muscle(const SceneOptions& options, const BodyMesh& body) {
             return {{"crawled", x.row(0).mean() - start}};
           }};
 }
+
+}  // namespace
+
+const SceneEntry muscle_scene{"muscle", "a worm wakes up and crawls: its fibres contract one after another", 12,
+                              muscle_body, muscle};
 
 }  // namespace penalty::demo

@@ -74,8 +74,6 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, const Y
           {"yield_law_error", error}};
 }
 
-}  // namespace
-
 BodyMesh plastic_body(const SceneOptions& options) {
   refuse_mesh(options, "plastic");
   refuse_model(options, "plastic");
@@ -112,5 +110,10 @@ SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
           .watch = [law](const Positions& x, const PotentialField& field, Real) { law->see(x, *field.find<Length>()); },
           .facts = [law](const Positions& x, const PotentialField& field) { return facts(x, field, *law); }};
 }
+
+}  // namespace
+
+const SceneEntry plastic_scene{"plastic", "a ball is pressed into a block of metal and withdrawn: the dent stays", 2.5,
+                               plastic_body, plastic};
 
 }  // namespace penalty::demo

@@ -193,8 +193,6 @@ Figure volume_forces() {
   return figure;
 }
 
-}  // namespace
-
 std::vector<Figure> potential_field(const SceneOptions& options) {
   refuse_mesh(options, "potential_field");
   std::vector<Figure> figures;
@@ -202,5 +200,10 @@ std::vector<Figure> potential_field(const SceneOptions& options) {
   figures.push_back(volume_forces());
   return figures;
 }
+
+}  // namespace
+
+const SceneEntry potential_field_scene{"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6,
+                                       nullptr, nullptr, potential_field};
 
 }  // namespace penalty::demo

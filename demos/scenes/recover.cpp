@@ -32,8 +32,6 @@ struct Tally {
   }
 };
 
-}  // namespace
-
 BodyMesh recover_body(const SceneOptions& options) { return load_body(options, "torus"); }
 
 SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
@@ -71,5 +69,10 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
   };
   return setup;
 }
+
+}  // namespace
+
+const SceneEntry recover_scene{"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16,
+                               recover_body, recover};
 
 }  // namespace penalty::demo

@@ -7,19 +7,8 @@ namespace penalty::demo {
 
 const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> list{
-      {"drop", "a mesh, by default the Stanford bunny, falls on the ground among rigid balls", 3, drop_body, drop},
-      {"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2, beam_body, beam},
-      {"flight", "a stretched, spinning body flies freely", 10, flight_body, flight},
-      {"cloth", "a sheet, held at its corners, catches a ball", 4, cloth_body, cloth},
-      {"balloon", "a balloon is blown up until it encloses two and a half times its volume", 4, balloon_body, balloon},
-      {"muscle", "a worm wakes up and crawls: its fibres contract one after another", 12, muscle_body, muscle},
-      {"plastic", "a ball is pressed into a block of metal and withdrawn: the dent stays", 2.5, plastic_body, plastic},
-      {"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear},
-      {"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
-       user_constraint_body, user_constraint},
-      {"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16, recover_body, recover},
-      {"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6, nullptr,
-       nullptr, potential_field}};
+      drop_scene, beam_scene, flight_scene, cloth_scene, balloon_scene, muscle_scene, plastic_scene,
+      tear_scene, user_constraint_scene, recover_scene, potential_field_scene};
   return list;
 }
 

@@ -72,27 +72,8 @@ const std::vector<SceneEntry>& scenes();
 const SceneEntry& find_scene(std::string_view name);
 
 // One file each.
-BodyMesh drop_body(const SceneOptions& options);
-SceneSetup drop(const SceneOptions& options, const BodyMesh& body);
-BodyMesh beam_body(const SceneOptions& options);
-SceneSetup beam(const SceneOptions& options, const BodyMesh& body);
-BodyMesh flight_body(const SceneOptions& options);
-SceneSetup flight(const SceneOptions& options, const BodyMesh& body);
-BodyMesh cloth_body(const SceneOptions& options);
-SceneSetup cloth(const SceneOptions& options, const BodyMesh& body);
-BodyMesh balloon_body(const SceneOptions& options);
-SceneSetup balloon(const SceneOptions& options, const BodyMesh& body);
-BodyMesh muscle_body(const SceneOptions& options);
-SceneSetup muscle(const SceneOptions& options, const BodyMesh& body);
-BodyMesh plastic_body(const SceneOptions& options);
-SceneSetup plastic(const SceneOptions& options, const BodyMesh& body);
-BodyMesh tear_body(const SceneOptions& options);
-SceneSetup tear(const SceneOptions& options, const BodyMesh& body);
-BodyMesh user_constraint_body(const SceneOptions& options);
-SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body);
-BodyMesh recover_body(const SceneOptions& options);
-SceneSetup recover(const SceneOptions& options, const BodyMesh& body);
-std::vector<Figure> potential_field(const SceneOptions& options);
+extern const SceneEntry drop_scene, beam_scene, flight_scene, cloth_scene, balloon_scene, muscle_scene,
+    plastic_scene, tear_scene, user_constraint_scene, recover_scene, potential_field_scene;
 
 /// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
 /// it.

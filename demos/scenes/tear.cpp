@@ -31,8 +31,6 @@ std::vector<Fact> facts(const Positions&, const PotentialField& field) {
           {"energy_of_broken_springs", energy}};
 }
 
-}  // namespace
-
 BodyMesh tear_body(const SceneOptions& options) {
   refuse_mesh(options, "tear");
   refuse_model(options, "tear");
@@ -87,5 +85,9 @@ SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
           .look = {.azimuth = 18, .elevation = 10, .still_time = 0.78},
           .facts = facts};
 }
+
+}  // namespace
+
+const SceneEntry tear_scene{"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear};
 
 }  // namespace penalty::demo

@@ -59,8 +59,6 @@ Real num_turns(const Positions& x, const PotentialField& field, Real num_section
   return angle / static_cast<Real>(missing.size()) * num_sections / (2 * std::numbers::pi);
 }
 
-}  // namespace
-
 BodyMesh user_constraint_body(const SceneOptions& options) {
   refuse_mesh(options, "user_constraint");
   const int cells = cells_in(options, default_cells, 12, 120), across = cells / 6;
@@ -106,5 +104,10 @@ SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
             return {{"turns", num_turns(x, field, sections)}, {"wanted_turns", turns}};
           }};
 }
+
+}  // namespace
+
+const SceneEntry user_constraint_scene{"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
+                                       user_constraint_body, user_constraint};
 
 }  // namespace penalty::demo

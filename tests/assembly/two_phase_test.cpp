@@ -132,6 +132,9 @@ TEST(TwoPhase, RefusesWhatDoesNotFitTogether) {
             "two phases: thresholds are 0.2 to enter and 0.3 to leave, must be 0 < leave <= enter");
   EXPECT_EQ(complaint<std::invalid_argument>([&] { TwoPhase(two.tetrahedra, field_of(one), field_of(one)); })
                 .rfind("two phases: tetrahedron ", 0), 0u);
+  const std::vector<Tetrahedron> flat{{0, 1, 2, 1}};
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { TwoPhase(flat, field_of(one), field_of(one)); }),
+            "two phases: tetrahedron 0 has no volume at rest");
 }
 
 }  // namespace

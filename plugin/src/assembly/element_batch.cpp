@@ -202,4 +202,23 @@ void ElementBatch::restore_state() {
   num_disabled_ = saved_.num_disabled;
 }
 
+void ElementBatch::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
+  std::vector<Real> strains, energies;
+  append_strains(x, strains);
+  append_energies(x, energies);
+  LedgerEntry entry{.name = name_, .num_elements = num_elements()};
+  for (std::size_t e = 0; e < num_elements(); ++e) {
+    if (!(stiffnesses_[e] > 0)) continue;
+    const Real strain = std::abs(strains[e]);
+    entry.energy += energies[e];
+    entry.mean_strain += strain;
+    if (entry.num_enabled++ == 0 || strain > entry.largest_strain) {
+      entry.largest_strain = strain;
+      entry.largest_element = static_cast<int>(e);
+    }
+  }
+  if (entry.num_enabled > 0) entry.mean_strain /= static_cast<Real>(entry.num_enabled);
+  ledger.push_back(std::move(entry));
+}
+
 }  // namespace penalty

@@ -35,6 +35,8 @@ TwoPhase::TwoPhase(std::span<const Tetrahedron> tetrahedra, PotentialField soft,
         throw std::invalid_argument("two phases: tetrahedron " + std::to_string(t) + ": index " + std::to_string(i) +
                                     " is outside the " + std::to_string(fields_[0].num_particles()) + " particles");
     inverse_rest_.push_back(edges_from_first(tetrahedra_[t], fields_[1].rest_positions()).inverse());
+    if (!inverse_rest_.back().allFinite())
+      throw std::invalid_argument("two phases: tetrahedron " + std::to_string(t) + " has no volume at rest");
   }
 }
 

@@ -40,17 +40,22 @@ void StepOptions::check() const {
   require(linear.tolerance > 0 && linear.tolerance < 1, "linear.tolerance", linear.tolerance, "in (0, 1)");
 }
 
+std::span<const EnergyFlows::Part> EnergyFlows::parts() {
+  static constexpr Part list[] = {{"constant_forces", &EnergyFlows::constant_forces},
+                                  {"contacts", &EnergyFlows::contacts},
+                                  {"couplings", &EnergyFlows::couplings},
+                                  {"driving", &EnergyFlows::driving},
+                                  {"changes", &EnergyFlows::changes},
+                                  {"damping", &EnergyFlows::damping},
+                                  {"drag", &EnergyFlows::drag},
+                                  {"inelastic", &EnergyFlows::inelastic},
+                                  {"integration", &EnergyFlows::integration},
+                                  {"contact_loss", &EnergyFlows::contact_loss}};
+  return list;
+}
+
 EnergyFlows& EnergyFlows::operator+=(const EnergyFlows& other) {
-  constant_forces += other.constant_forces;
-  contacts += other.contacts;
-  couplings += other.couplings;
-  driving += other.driving;
-  changes += other.changes;
-  damping += other.damping;
-  drag += other.drag;
-  inelastic += other.inelastic;
-  integration += other.integration;
-  contact_loss += other.contact_loss;
+  for (const Part& part : parts()) this->*part.member += other.*part.member;
   return *this;
 }
 

@@ -117,7 +117,6 @@ class Batch final : public ElementBatch {
   void append_strains(const Positions& x, std::vector<Real>& strains) const override;
   void append_energies(const Positions& x, std::vector<Real>& energies) const override;
   void add_particle_energies(const Positions& x, std::span<Real> energies) const override;
-  void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
 
  private:
   // The stiffness of an element of many points is not one dense block.
@@ -159,11 +158,35 @@ class Batch final : public ElementBatch {
     return !is_plain() && profile(e).is_slack(deviation(kinds_[e], points));
   }
 
+  /// Calls visit(e, s) for every enabled element, its points at `x` gathered into the scratch s.
+  template <class Visit>
+  [[gnu::always_inline]] void for_each_enabled(const Positions& x, const Visit& visit) const {
+    for (std::size_t e = 0; e < stencils_.size(); ++e) {
+      if (is_off(e)) continue;
+      auto&& s = scratch(e);
+      gather(e, x, s.points);
+      visit(e, s);
+    }
+  }
+
+  /// Calls visit(e, s, damping) for every element that damps and is not slack, with its damping coefficient [J s] at the damping
+  /// time of the step.
+  template <class Visit>
+  void for_each_damped(const Positions& x, Real time, const Visit& visit) const {
+    for (std::size_t e = 0; e < stencils_.size(); ++e) {
+      const Real damping = damping_time(e, time) * stiffnesses_[e];
+      if (!(damping > 0)) continue;
+      auto&& s = scratch(e);
+      gather(e, x, s.points);
+      if (!is_slack(e, s.points)) visit(e, s, damping);
+    }
+  }
+
   template <class VisitBlock, class VisitTerm>
   void visit_structured(std::size_t e, Scratch& s, StiffnessModel model, const VisitBlock& visit_block,
                         const VisitTerm& visit_term) const;
 
-  /// The modes that element e damps, with their weights in units of its damping; none of a slack element.
+  /// The modes that element e damps, with their weights in units of its damping.
   template <class Visit>
   void visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const;
 
@@ -175,12 +198,9 @@ class Batch final : public ElementBatch {
 template <ElementKind Kind>
 Real Batch<Kind>::energy(const Positions& x) const {
   Real sum = 0;
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
     sum += penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e));
-  }
+  });
   return sum;
 }
 
@@ -197,312 +217,20 @@ Real Batch<Kind>::add_forces(const Positions& x, Forces f) const {
     }
   }
   Real sum = 0;
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
     sum += energy_and_gradient(kinds_[e], stiffnesses_[e], s.points, profile(e), s.gradient);
     scatter(e, s.gradient, -1, f);
-  }
+  });
   return sum;
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_damping_forces(const Positions& x, const Vectors& v, Real time, Forces f) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    const Real damping = damping_time(e, time) * stiffnesses_[e];
-    if (!(damping > 0)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    if (is_slack(e, s.points)) continue;
-    gather(e, v, s.vectors);
-    scatter(e, damping_force(kinds_[e], damping, s.points, s.vectors), 1, f);
-  }
-}
-
-/// Blocks and rank-one terms of one element; the sum of both is its stiffness.
-template <ElementKind Kind>
-template <class VisitBlock, class VisitTerm>
-void Batch<Kind>::visit_structured(std::size_t e, Scratch& s, StiffnessModel model, const VisitBlock& visit_block,
-                                   const VisitTerm& visit_term) const {
-  const Kind& kind = kinds_[e];
-  const Real k = stiffnesses_[e];
-  const Profile profile = this->profile(e);
-  if constexpr (Constraint<Kind>) {
-    const Real c = value_and_gradient(kind, s.points, s.gradient);
-    if (is_slack(e, c, model)) return;
-    visit_term(k, s.gradient);
-    // The Hessian of a constraint of many points is projected as a whole or not at all: psd leaves it out.
-    if constexpr (HasSparseHessian<Kind>)
-      if (model == StiffnessModel::exact)
-        kind.visit_hessian_blocks(s.points, [&](int i, int j, const Matrix3& block) {
-          visit_block(i, j, k * profile.strain(c) * block);
-        });
-  } else {
-    const Real psi = kind.energy_and_gradient(s.points, s.gradient);
-    const Real c = std::sqrt(2 * std::max<Real>(psi, 0));
-    if (is_slack(e, c, model)) return;
-    Real share = 1;
-    if (!profile.is_plain() && model != StiffnessModel::taut) {
-      if (!(c > 0)) return;
-      share = profile.strain(c) / c;
-      if (share < 0 && model != StiffnessModel::exact) share = 0;
-      if (share < 1) visit_term(k * (1 - share) / (c * c), s.gradient);
-    }
-    kind.visit_stiffness(
-        s.points, model != StiffnessModel::exact,
-        [&](int i, Real value) { visit_block(i, i, Matrix3::Identity() * (k * share * value)); },
-        [&](Real coefficient, const Gradient<num_points>& mode) { visit_term(k * share * coefficient, mode); });
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      visit_structured(
-          e, s, model, [&](int i, int j, const Matrix3& block) { stiffness.add_block(stencil[i], stencil[j], block); },
-          [](Real, const Gradient<num_points>&) {});
-    } else {
-      const Hessian<num_points> k = stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e));
-      const int n = static_cast<int>(stencil.size());
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j)
-          stiffness.add_block(stencil[i], stencil[j], k.template block<3, 3>(3 * i, 3 * j));
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::append_pattern(std::vector<std::pair<int, int>>& pattern) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      if constexpr (HasSparseHessian<Kind>)
-        kinds_[e].visit_hessian_pattern([&](int i, int j) { pattern.emplace_back(stencil[i], stencil[j]); });
-      // The diagonal is in every pattern.
-    } else {
-      for (const int row : stencil)
-        for (const int column : stencil) pattern.emplace_back(row, column);
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const {
-  if constexpr (is_structured)
-    for (std::size_t e = 0; e < stencils_.size(); ++e) {
-      if (is_off(e)) continue;
-      Scratch& s = scratch_[e];
-      gather(e, x, s.points);
-      visit_structured(
-          e, s, model, [](int, int, const Matrix3&) {},
-          [&](Real coefficient, const Gradient<num_points>& mode) { terms.push_back({coefficient, stencils_[e], mode}); });
-    }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
-                                        Forces df) const {
-  const bool bare = model == StiffnessModel::gauss_newton || model == StiffnessModel::taut;
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    gather(e, dx, s.vectors);
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      visit_structured(
-          e, s, model,
-          [&](int i, int j, const Matrix3& block) {
-            df.col(stencil[i]).template head<3>() += scale * (block * s.vectors.col(j));
-          },
-          [&](Real coefficient, const Gradient<num_points>& mode) {
-            scatter(e, mode, scale * coefficient * mode.cwiseProduct(s.vectors).sum(), df);
-          });
-    } else if (Constraint<Kind> && bare) {
-      if constexpr (Constraint<Kind>) {
-        const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
-        if (is_slack(e, c, model)) continue;
-        Real dc = 0;
-        for (Eigen::Index k = 0; k < s.gradient.cols(); ++k) dc += s.gradient.col(k).dot(s.vectors.col(k));
-        scatter(e, s.gradient, scale * stiffnesses_[e] * dc, df);
-      }
-    } else {
-      s.gradient.reshaped() =
-          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e)) * s.vectors.reshaped();
-      scatter(e, s.gradient, scale, df);
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      visit_structured(
-          e, s, StiffnessModel::gauss_newton,
-          [&](int i, int j, const Matrix3& block) {
-            if (i == j) diagonal.col(stencil[i]).template head<3>() += scale * block.diagonal();
-          },
-          [&](Real coefficient, const Gradient<num_points>& mode) {
-            scatter(e, mode.cwiseAbs2(), scale * coefficient, diagonal);
-          });
-    } else if constexpr (Constraint<Kind>) {
-      const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
-      if (!is_slack(e, c, StiffnessModel::gauss_newton))
-        scatter(e, s.gradient.cwiseAbs2(), scale * stiffnesses_[e], diagonal);
-    } else {
-      const Hessian<num_points> k =
-          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, StiffnessModel::gauss_newton, profile(e));
-      s.gradient.reshaped() = k.diagonal();
-      scatter(e, s.gradient, scale, diagonal);
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_bounds(const Positions& x, std::span<Real> bounds) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    const Stencil& stencil = stencils_[e];
-    const auto add_rank_one = [&](Real coefficient, const Gradient<num_points>& mode) {
-      const Real sum = mode.colwise().norm().sum();
-      for (Eigen::Index k = 0; k < mode.cols(); ++k)
-        bounds[stencil[k]] += std::abs(coefficient) * sum * mode.col(k).norm();
-    };
-    if constexpr (is_structured) {
-      visit_structured(
-          e, s, StiffnessModel::taut,
-          [&](int i, int, const Matrix3& block) { bounds[stencil[i]] += block.norm() / std::sqrt(3.0); },
-          [&](Real coefficient, const Gradient<num_points>& mode) {
-            if (coefficient > 0) add_rank_one(coefficient, mode);  // the others only lower the eigenvalues
-          });
-    } else if constexpr (Constraint<Kind>) {
-      s.gradient = kinds_[e].gradient(s.points);
-      add_rank_one(stiffnesses_[e], s.gradient);
-    } else {
-      const Hessian<num_points> k =
-          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, StiffnessModel::taut, profile(e));
-      const int n = static_cast<int>(stencil.size());
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) bounds[stencil[i]] += k.template block<3, 3>(3 * i, 3 * j).norm();
-    }
-  }
-}
-
-template <ElementKind Kind>
-template <class Visit>
-void Batch<Kind>::visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const {
-  if (is_slack(e, s.points)) return;
-  if constexpr (Constraint<Kind>) {
-    value_and_gradient(kinds_[e], s.points, s.gradient);
-    visit(1, s.gradient);
-  } else if constexpr (HasDampingModes<Kind>) {
-    kinds_[e].visit_damping_modes(s.points, visit);
-  } else {
-    const Real psi = kinds_[e].energy_and_gradient(s.points, s.gradient);
-    if (psi > 0) visit(1 / (2 * psi), s.gradient);
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_damping(const Positions& x, Real time, BlockMatrix& matrix) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    const Real damping = damping_time(e, time) * stiffnesses_[e];
-    if (!(damping > 0)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    const Stencil& stencil = stencils_[e];
-    if constexpr (HasRigidDamping<Kind>) {
-      if (is_slack(e, s.points)) continue;
-      kinds_[e].visit_damping(
-          s.points,
-          [&](int i, Real value) {
-            matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value));
-          },
-          [](Real, const Gradient<num_points>&) {});
-    } else if constexpr (num_points != dynamic) {
-      Hessian<num_points> d = Hessian<num_points>::Zero();
-      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& mode) {
-        d.noalias() += (damping * weight) * mode.reshaped() * mode.reshaped().transpose();
-      });
-      for (int i = 0; i < num_points; ++i)
-        for (int j = 0; j < num_points; ++j)
-          matrix.add_block(stencil[i], stencil[j], d.template block<3, 3>(3 * i, 3 * j));
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
-  if constexpr (num_points == dynamic)
-    for (std::size_t e = 0; e < stencils_.size(); ++e) {
-      const Real damping = damping_time(e, time) * stiffnesses_[e];
-      if (!(damping > 0)) continue;
-      Scratch& s = scratch_[e];
-      gather(e, x, s.points);
-      const auto append = [&](Real weight, const Gradient<num_points>& mode) {
-        terms.push_back({damping * weight, stencils_[e], mode});
-      };
-      if constexpr (HasRigidDamping<Kind>) {
-        if (!is_slack(e, s.points)) kinds_[e].visit_damping(s.points, [](int, Real) {}, append);
-      } else
-        visit_damping_modes(e, s, append);
-    }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
-                            Forces v) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    const Real damping = damping_time(e, time) * duration * stiffnesses_[e];
-    if (!(damping > 0)) continue;
-    auto&& s = scratch(e);
-    const Stencil& stencil = stencils_[e];
-    gather(e, x, s.points);
-    if constexpr (HasRigidDamping<Kind>) {
-      if (is_slack(e, s.points)) continue;
-      for (std::size_t k = 0; k < stencil.size(); ++k) s.inverse_masses[k] = inverse_masses[stencil[k]];
-      gather_points(stencil, v.data(), s.vectors);
-      kinds_[e].damp(s.points, s.inverse_masses, damping, s.vectors);
-      for (std::size_t k = 0; k < stencil.size(); ++k)
-        v.col(stencil[k]).template head<3>() = s.vectors.col(static_cast<Eigen::Index>(k));
-    } else {
-      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& gradient) {
-        Real rate = 0, mobility = 0;  // dC/dt and dC M^-1 dCᵀ
-        for (Eigen::Index k = 0; k < gradient.cols(); ++k) {
-          rate += gradient.col(k).dot(v.col(stencil[k]).template head<3>());
-          mobility += inverse_masses[stencil[k]] * gradient.col(k).squaredNorm();
-        }
-        const Real impulse = -damping * weight * rate / (1 + damping * weight * mobility);
-        for (Eigen::Index k = 0; k < gradient.cols(); ++k)
-          v.col(stencil[k]).template head<3>() += inverse_masses[stencil[k]] * impulse * gradient.col(k);
-      });
-    }
-  }
 }
 
 template <ElementKind Kind>
 Real Batch<Kind>::evolve(const Positions& x, Real duration) {
   if (!evolves()) return 0;
   Real taken = 0;
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
     taken += evolve_element(e, deviation(kinds_[e], s.points), duration);
-  }
+  });
   return taken;
 }
 
@@ -528,33 +256,18 @@ void Batch<Kind>::append_energies(const Positions& x, std::vector<Real>& energie
 
 template <ElementKind Kind>
 void Batch<Kind>::add_particle_energies(const Positions& x, std::span<Real> energies) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
     const Real share = penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)) / static_cast<Real>(stencils_[e].size());
     for (const int i : stencils_[e]) energies[i] += share;
-  }
+  });
 }
 
-template <ElementKind Kind>
-void Batch<Kind>::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
-  LedgerEntry entry{.name = name(), .num_elements = num_elements()};
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    if (is_off(e)) continue;
-    auto&& s = scratch(e);
-    gather(e, x, s.points);
-    const Real strain = std::abs(profile(e).strain(deviation(kinds_[e], s.points)));
-    entry.energy += penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e));
-    entry.mean_strain += strain;
-    if (entry.num_enabled++ == 0 || strain > entry.largest_strain) {
-      entry.largest_strain = strain;
-      entry.largest_element = static_cast<int>(e);
-    }
-  }
-  if (entry.num_enabled > 0) entry.mean_strain /= static_cast<Real>(entry.num_enabled);
-  ledger.push_back(entry);
-}
+}  // namespace penalty
+
+#include "penalty/assembly/batch_damping.h"
+#include "penalty/assembly/batch_stiffness.h"
+
+namespace penalty {
 
 // Compiled once, in the library.
 extern template class Batch<Length>;

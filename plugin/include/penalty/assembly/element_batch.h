@@ -1,6 +1,5 @@
 // What all batches share, whatever their kind: stiffnesses, and the modifiers that change at run time.
 #pragma once
-#include <optional>
 #include <string>
 
 #include "penalty/assembly/potential.h"
@@ -64,6 +63,7 @@ class ElementBatch : public Potential {
   void save_state() override;
   void restore_state() override;
   std::uint64_t stiffness_version() const override { return version_; }
+  void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
 
  protected:
   /// `period` as in Profile.

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -22,7 +23,7 @@ struct RankOneTerm {
 /// A line of the energy ledger: one batch of elements at one instant. Strains are those that are resisted: C less target and
 /// free play.
 struct LedgerEntry {
-  std::string_view name;  // valid as long as the batch
+  std::string name;
   std::size_t num_elements = 0, num_enabled = 0;
   Real energy = 0;                             // [J]
   Real mean_strain = 0, largest_strain = 0;    // of |strain|, over the enabled elements

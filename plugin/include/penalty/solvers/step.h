@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "penalty/assembly/potential.h"
 #include "penalty/math/affine_span.h"
@@ -74,6 +75,13 @@ struct EnergyFlows {
   Real received() const { return constant_forces + contacts + couplings + driving + changes; }
   Real lost() const { return damping + drag + inelastic + integration; }
   EnergyFlows& operator+=(const EnergyFlows& other);
+
+  /// All of them, by name.
+  struct Part {
+    std::string_view name;
+    Real EnergyFlows::*member;
+  };
+  static std::span<const Part> parts();
 };
 
 /// What implicit steps keep between steps.
@@ -81,7 +89,7 @@ struct ImplicitState {
   NewtonSolver newton;
   PackedVectors acceleration;  // mean one of the last step [m/s²]
   bool has_acceleration = false;
-  PackedVectors from, start, guess;  // what the step works in
+  PackedVectors from, guess;  // what the step works in
 };
 
 /// One body of an island: its state, its potential and what the integrator remembers of it between steps. The potential
