@@ -58,7 +58,7 @@ struct Problem {
     solver.set_pattern(system.matrix);
     solver.factorize(system, x);
     PackedVectors y(4, x.cols());
-    const int used = solver.solve(system, b, options, y);
+    const int used = solver.solve(system, b, options, y).iterations;
     if (iterations) *iterations = used;
     return y;
   }

@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "stepped_body.h"
 
@@ -82,7 +81,6 @@ class ImplicitStep {
  private:
   void aim();
   void choose_start();
-  void propose(const PackedVectors& x, Real& least);
   void minimize();
   void restore_momenta(const RigidState& before);
   bool is_free() const { return newton_.fixed().empty(); }
@@ -111,27 +109,18 @@ void ImplicitStep::aim() {
     objective.damped_from.resize(4, 0);
 }
 
-void ImplicitStep::propose(const PackedVectors& x, Real& least) {
-  const Real value = newton_.value(x);
-  if (!(value < least)) return;
-  least = value;
-  state_.start = x;
-}
-
 // The best of four guesses: free flight, rest, the acceleration of the last step once more, and rigid motion.
 void ImplicitStep::choose_start() {
   const Objective& objective = newton_.objective;
-  Real least = std::numeric_limits<Real>::infinity();
-  state_.start = objective.targets;
   newton_.prepare();
-  propose(objective.targets, least);
+  newton_.start(objective.targets);
   PackedVectors& guess = state_.guess;
   guess = state_.from;
   for (const int i : newton_.fixed()) guess.col(i) = objective.targets.col(i);
-  propose(guess, least);
+  newton_.offer(guess);
   if (state_.has_acceleration) {
     guess = state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration;
-    propose(guess, least);
+    newton_.offer(guess);
   }
   if (!is_free()) return;
   const RigidState rigid(particles_);
@@ -142,11 +131,10 @@ void ImplicitStep::choose_start() {
   const Vector3 center = rigid.center + duration_ * rigid.momentum / rigid.mass + duration_ * duration_ * body_.gravity;
   for (int i = 0; i < particles_.size(); ++i)
     guess.col(i).head<3>() = rotation * (state_.from.col(i).head<3>() - rigid.center) + center;
-  propose(guess, least);
+  newton_.offer(guess);
 }
 
 void ImplicitStep::minimize() {
-  newton_.start(state_.start);
   const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
   const Real stiffness = 1 / (duration_ * duration_) + body_.largest_eigenvalue;  // of inertia and elements, per mass
   const Real noise = round_off2 * body_.mass * stiffness * body_.rest_span.spreads.squaredNorm();

@@ -177,32 +177,32 @@ Real LinearSolver::squared_norm(const LinearSystem& system, const PackedVectors&
   return r.cwiseProduct(preconditioned_).sum();
 }
 
-int LinearSolver::solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x) {
+LinearReport LinearSolver::solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x) {
   x.setZero();
   residual_ = b;
   system.clear_fixed(residual_);
   precondition(system, residual_, preconditioned_);
   Real rz = residual_.cwiseProduct(preconditioned_).sum();
+  LinearReport report{.squared_norm = rz};
   const Real enough = options.tolerance * options.tolerance * rz;
-  if (!(rz > 0)) return 0;
+  if (!(rz > 0)) return report;
   search_ = preconditioned_;
-  int iteration = 0;
-  while (iteration < options.max_iterations) {
+  while (report.iterations < options.max_iterations) {
     system.multiply(search_, product_);
     const Real curvature = search_.cwiseProduct(product_).sum();
     if (!(curvature > 0)) break;
     const Real length = rz / curvature;
     x += length * search_;
     residual_ -= length * product_;
-    ++iteration;
+    ++report.iterations;
     precondition(system, residual_, preconditioned_);
     const Real next = residual_.cwiseProduct(preconditioned_).sum();
     if (!(next > enough)) break;
     search_ = preconditioned_ + (next / rz) * search_;
     rz = next;
   }
-  if (iteration == 0) x = preconditioned_;  // no curvature: downhill at least
-  return iteration;
+  if (report.iterations == 0) x = preconditioned_;  // no curvature: downhill at least
+  return report;
 }
 
 }  // namespace penalty

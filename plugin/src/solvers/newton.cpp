@@ -62,12 +62,6 @@ void NewtonSolver::evaluate(State& state) {
   system_.clear_fixed(state.gradient);
 }
 
-Real NewtonSolver::value(const PackedVectors& x) {
-  trial_.positions = x;
-  evaluate(trial_);
-  return trial_.value;
-}
-
 void NewtonSolver::prepare() {
   if (objective.damped_from.size() != 0) {
     damping_.matrix.set_zero();
@@ -83,6 +77,12 @@ void NewtonSolver::prepare() {
 void NewtonSolver::start(const PackedVectors& x) {
   here_.positions = x;
   evaluate(here_);
+}
+
+void NewtonSolver::offer(const PackedVectors& x) {
+  trial_.positions = x;
+  evaluate(trial_);
+  if (trial_.value < here_.value || std::isnan(here_.value)) std::swap(here_, trial_);
 }
 
 void NewtonSolver::assemble() {
@@ -113,10 +113,11 @@ NewtonIteration NewtonSolver::iterate() {
   assemble();
   solver_.factorize(system_, here_.positions);
   displacement_ = -here_.gradient;
-  iteration.linear_iterations = solver_.solve(system_, displacement_, linear, direction_);
+  const LinearReport solved = solver_.solve(system_, displacement_, linear, direction_);
+  iteration.linear_iterations = solved.iterations;
+  iteration.before = solved.squared_norm;
   const Real slope = here_.gradient.cwiseProduct(direction_).sum();
   if (!(slope < 0)) return iteration;
-  iteration.before = solver_.squared_norm(system_, here_.gradient);
   iteration.displacement = std::sqrt(direction_.colwise().squaredNorm().maxCoeff());
 
   Real length = 1;

@@ -26,6 +26,11 @@ struct LinearOptions {
   Real tolerance = 1e-2;  // reduction of the residual in the norm of the preconditioner
 };
 
+struct LinearReport {
+  int iterations = 0;
+  Real squared_norm = 0;  // b . P⁻¹ b, P the preconditioner
+};
+
 /// Preconditioned conjugate gradients. The preconditioner is additive: the inverses of the 3 x 3 blocks on the diagonal
 /// take care of what is stiff and near, and a coarse space of what is smooth: the particles in groups of neighbours,
 /// each of which moves as a rigid body (6 unknowns a group, a dense Cholesky factorisation). Deterministic, and
@@ -39,8 +44,8 @@ class LinearSolver {
   void factorize(const LinearSystem& system, const Positions& x);
 
   /// Solves A x = b from x = 0; the columns of fixed particles become zero. Whatever the number of iterations, b . x > 0
-  /// unless b is zero or not finite. Returns the number of iterations.
-  int solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x);
+  /// unless b is zero or not finite.
+  LinearReport solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x);
 
   /// r . P⁻¹ r, P the preconditioner.
   Real squared_norm(const LinearSystem& system, const PackedVectors& r);
@@ -54,7 +59,7 @@ class LinearSolver {
   std::vector<int> group_of_;                   // of each particle
   std::vector<int> group_begin_, group_members_;
   std::vector<Matrix3> inverse_diagonal_;
-  PackedVectors arms_;                          // from the centre of the group, in units of its size; fixed: zero
+  PackedVectors arms_;                          // from the centre of the group, in units of its size
   std::vector<Real> moves_;                     // 1, of fixed particles 0
   Eigen::MatrixXd coarse_;                      // its Cholesky factor in the lower triangle
   Eigen::VectorXd coarse_scale_, coarse_vector_;

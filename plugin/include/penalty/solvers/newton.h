@@ -50,11 +50,9 @@ class NewtonSolver {
   /// Share of the mean stiffness that is added to the diagonal: what has no inertia may be free to move.
   Real regularization = 0;
 
-  /// Phi of `x`; may be infinite or not a number.
-  Real value(const PackedVectors& x);
-
-  /// Begins at `x`, which stays where it is until `iterate`.
+  /// Begins at `x`, or, if Phi is less there, moves to `x`.
   void start(const PackedVectors& x);
+  void offer(const PackedVectors& x);
   NewtonIteration iterate();
 
   const PackedVectors& positions() const { return here_.positions; }
