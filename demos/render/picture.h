@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 #include "render/camera.h"
 #include "render/color.h"
 #include "render/curve.h"

@@ -5,7 +5,7 @@
 #include <variant>
 
 #include "penalty/mesh/embed.h"
-#include "penalty/solvers/contact.h"
+#include "penalty/stepping/contact.h"
 #include "scenes/scene_options.h"
 
 namespace penalty::demo {

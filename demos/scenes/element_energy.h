@@ -1,6 +1,6 @@
 // Where in a body its elastic energy is, and where it broke.
 #pragma once
-#include "penalty/assembly/potential_field.h"
+#include "penalty/fields/potential_field.h"
 #include "scenes/body_mesh.h"
 
 namespace penalty::demo {

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 
 namespace penalty::demo {
 

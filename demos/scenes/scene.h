@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "penalty/solvers/particles.h"
+#include "penalty/stepping/particles.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {

@@ -1,6 +1,6 @@
 #include <stdexcept>
 
-#include "penalty/assembly/two_phase.h"
+#include "penalty/fields/two_phase.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {

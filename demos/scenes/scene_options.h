@@ -8,7 +8,7 @@
 
 #include "penalty/energy/material.h"
 #include "penalty/math/types.h"
-#include "penalty/solvers/step.h"
+#include "penalty/stepping/step.h"
 
 namespace penalty::demo {
 

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "penalty/assembly/potential_field.h"
-#include "penalty/solvers/step.h"
+#include "penalty/fields/potential_field.h"
+#include "penalty/stepping/step.h"
 #include "scenes/body_mesh.h"
 #include "scenes/figure.h"
 #include "scenes/rigid_object.h"

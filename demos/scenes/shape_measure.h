@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 
 namespace penalty::demo {
 

@@ -1,6 +1,6 @@
 // Thin sheets from springs and hinges: cloth, the skin of a balloon, foil.
 #pragma once
-#include "penalty/assembly/potential_field.h"
+#include "penalty/fields/potential_field.h"
 #include "penalty/mesh/triangle_surface.h"
 
 namespace penalty::demo {

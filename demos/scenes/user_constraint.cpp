@@ -4,7 +4,7 @@
 #include <numbers>
 #include <type_traits>
 
-#include "penalty/constraints/user_constraint.h"
+#include "penalty/kinds/user_constraint.h"
 #include "penalty/mesh/builders.h"
 #include "scenes/scene_setup.h"
 #include "scenes/start_shapes.h"

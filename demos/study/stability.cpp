@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <random>
 
-#include "penalty/assembly/potential_field.h"
-#include "penalty/constraints/kinds.h"
+#include "penalty/fields/potential_field.h"
+#include "penalty/kinds/kinds.h"
 #include "penalty/mesh/builders.h"
-#include "penalty/solvers/step.h"
+#include "penalty/stepping/step.h"
 
 namespace penalty::study {
 namespace {

@@ -1,4 +1,4 @@
-#include "penalty/solvers/relax.h"
+#include "penalty/stepping/relax.h"
 #include "scenes/start_shapes.h"
 #include "study/recovery_watch.h"
 #include "study/run_case.h"

@@ -3,7 +3,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "penalty/assembly/two_phase.h"
+#include "penalty/fields/two_phase.h"
 
 namespace penalty::study {
 namespace {

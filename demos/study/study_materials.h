@@ -3,7 +3,7 @@
 #include <span>
 #include <string_view>
 
-#include "penalty/assembly/potential_field.h"
+#include "penalty/fields/potential_field.h"
 #include "penalty/mesh/tet_mesh.h"
 
 namespace penalty::study {

@@ -8,7 +8,7 @@
 
 #include <limits>
 
-#include "penalty/assembly/two_phase.h"
+#include "penalty/fields/two_phase.h"
 
 namespace penalty::testing {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <thread>
 
-#include "penalty/assembly/two_phase.h"
+#include "penalty/fields/two_phase.h"
 #include "penalty/mesh/builders.h"
-#include "penalty/solvers/relax.h"
+#include "penalty/stepping/relax.h"
 #include "recovery.h"
 #include "scenes/shape_measure.h"
 #include "scenes/start_shapes.h"

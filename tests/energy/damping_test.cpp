@@ -1,4 +1,4 @@
-#include "constraints/samples.h"
+#include "kinds/samples.h"
 #include "penalty/energy/penalty_energy.h"
 
 namespace penalty::testing {

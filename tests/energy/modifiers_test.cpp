@@ -2,7 +2,7 @@
 #include "penalty/energy/modifiers.h"
 
 #include "math/random.h"
-#include "penalty/constraints/length.h"
+#include "penalty/kinds/length.h"
 #include "penalty/energy/penalty_energy.h"
 
 namespace penalty::testing {

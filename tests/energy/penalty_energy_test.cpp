@@ -1,7 +1,7 @@
 // The chain rule over every kind: energy, force, stiffness.
 #include "penalty/energy/penalty_energy.h"
 
-#include "constraints/samples.h"
+#include "kinds/samples.h"
 #include "math/eigenvalues.h"
 #include "penalty/math/finite_difference.h"
 

@@ -1,11 +1,11 @@
 // The kinds that bodies are made of have their projected stiffness in closed form: it obeys the laws of the projection.
 #include <array>
 
-#include "constraints/samples.h"
+#include "kinds/samples.h"
 #include "math/allocations.h"
 #include "math/eigenvalues.h"
 #include "penalty/energy/penalty_energy.h"
-#include "penalty/energy/stable_neo_hookean.h"
+#include "penalty/kinds/stable_neo_hookean.h"
 
 namespace penalty::testing {
 namespace {

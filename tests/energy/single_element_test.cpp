@@ -1,7 +1,7 @@
 // One element, by hand.
 #include <numbers>
 
-#include "constraints/samples.h"
+#include "kinds/samples.h"
 #include "penalty/energy/penalty_energy.h"
 
 namespace penalty::testing {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 #include "penalty/math/types.h"
 
 namespace penalty {

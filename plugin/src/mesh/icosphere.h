@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 
 namespace penalty {
 

@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "penalty/assembly/potential_field.h"
-#include "penalty/solvers/step.h"
+#include "penalty/fields/potential_field.h"
+#include "penalty/stepping/step.h"
 
 class btRigidBody;
 class btSoftBody;

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "penalty/assembly/potential_field.h"
+#include "penalty/fields/potential_field.h"
 
 namespace penalty {
 

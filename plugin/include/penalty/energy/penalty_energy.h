@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "penalty/constraints/constraint.h"
+#include "penalty/kinds/kind.h"
 #include "penalty/energy/modifiers.h"
 #include "penalty/math/psd_projection.h"
 

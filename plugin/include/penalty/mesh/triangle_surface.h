@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "penalty/assembly/topology.h"
+#include "penalty/fields/topology.h"
 #include "penalty/math/types.h"
 
 namespace penalty {

@@ -1,0 +1,93 @@
+// The damping of a batch: part of batch.h.
+#pragma once
+#include "penalty/assembly/batch.h"
+
+namespace penalty {
+
+template <ElementKind Kind>
+void Batch<Kind>::add_damping_forces(const Positions& x, const Vectors& v, Real time, Forces f) const {
+  for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
+    gather(e, v, s.vectors);
+    scatter(e, damping_force(kinds_[e], damping, s.points, s.vectors), 1, f);
+  });
+}
+
+template <ElementKind Kind>
+template <class Visit>
+void Batch<Kind>::visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const {
+  if constexpr (Constraint<Kind>) {
+    value_and_gradient(kinds_[e], s.points, s.gradient);
+    visit(1, s.gradient);
+  } else if constexpr (HasDampingModes<Kind>) {
+    kinds_[e].visit_damping_modes(s.points, visit);
+  } else {
+    const Real psi = kinds_[e].energy_and_gradient(s.points, s.gradient);
+    if (psi > 0) visit(1 / (2 * psi), s.gradient);
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_damping(const Positions& x, Real time, BlockMatrix& matrix) const {
+  for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
+    const Stencil& stencil = stencils_[e];
+    if constexpr (HasRigidDamping<Kind>) {
+      kinds_[e].visit_damping(
+          s.points,
+          [&](int i, Real value) {
+            matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value));
+          },
+          [](Real, const Gradient<num_points>&) {});
+    } else if constexpr (num_points != dynamic) {
+      Hessian<num_points> d = Hessian<num_points>::Zero();
+      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& mode) {
+        d.noalias() += (damping * weight) * mode.reshaped() * mode.reshaped().transpose();
+      });
+      for (int i = 0; i < num_points; ++i)
+        for (int j = 0; j < num_points; ++j)
+          matrix.add_block(stencil[i], stencil[j], d.template block<3, 3>(3 * i, 3 * j));
+    }
+  });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
+  if constexpr (num_points == dynamic)
+    for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
+      const auto append = [&](Real weight, const Gradient<num_points>& mode) {
+        terms.push_back({damping * weight, stencils_[e], mode});
+      };
+      if constexpr (HasRigidDamping<Kind>)
+        kinds_[e].visit_damping(s.points, [](int, Real) {}, append);
+      else
+        visit_damping_modes(e, s, append);
+    });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
+                            Forces v) const {
+  for_each_damped(x, time, [&](std::size_t e, auto& s, Real coefficient) {
+    const Real damping = coefficient * duration;
+    const Stencil& stencil = stencils_[e];
+    if constexpr (HasRigidDamping<Kind>) {
+      for (std::size_t k = 0; k < stencil.size(); ++k) s.inverse_masses[k] = inverse_masses[stencil[k]];
+      gather_points(stencil, v.data(), s.vectors);
+      kinds_[e].damp(s.points, s.inverse_masses, damping, s.vectors);
+      for (std::size_t k = 0; k < stencil.size(); ++k)
+        v.col(stencil[k]).template head<3>() = s.vectors.col(static_cast<Eigen::Index>(k));
+    } else {
+      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& gradient) {
+        Real rate = 0, mobility = 0;  // dC/dt and dC M^-1 dCᵀ
+        for (Eigen::Index k = 0; k < gradient.cols(); ++k) {
+          rate += gradient.col(k).dot(v.col(stencil[k]).template head<3>());
+          mobility += inverse_masses[stencil[k]] * gradient.col(k).squaredNorm();
+        }
+        const Real impulse = -damping * weight * rate / (1 + damping * weight * mobility);
+        for (Eigen::Index k = 0; k < gradient.cols(); ++k)
+          v.col(stencil[k]).template head<3>() += inverse_masses[stencil[k]] * impulse * gradient.col(k);
+      });
+    }
+  });
+}
+
+}  // namespace penalty

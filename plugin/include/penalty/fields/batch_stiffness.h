@@ -1,0 +1,173 @@
+// The second derivatives of a batch: part of batch.h.
+#pragma once
+#include "penalty/assembly/batch.h"
+
+namespace penalty {
+
+/// Blocks and rank-one terms of one element; the sum of both is its stiffness.
+template <ElementKind Kind>
+template <class VisitBlock, class VisitTerm>
+void Batch<Kind>::visit_structured(std::size_t e, Scratch& s, StiffnessModel model, const VisitBlock& visit_block,
+                                   const VisitTerm& visit_term) const {
+  const Kind& kind = kinds_[e];
+  const Real k = stiffnesses_[e];
+  const Profile profile = this->profile(e);
+  if constexpr (Constraint<Kind>) {
+    const Real c = value_and_gradient(kind, s.points, s.gradient);
+    if (is_slack(e, c, model)) return;
+    visit_term(k, s.gradient);
+    // The Hessian of a constraint of many points is projected as a whole or not at all: psd leaves it out.
+    if constexpr (HasSparseHessian<Kind>)
+      if (model == StiffnessModel::exact)
+        kind.visit_hessian_blocks(s.points, [&](int i, int j, const Matrix3& block) {
+          visit_block(i, j, k * profile.strain(c) * block);
+        });
+  } else {
+    const Real psi = kind.energy_and_gradient(s.points, s.gradient);
+    const Real c = std::sqrt(2 * std::max<Real>(psi, 0));
+    if (is_slack(e, c, model)) return;
+    Real share = 1;
+    if (!profile.is_plain() && model != StiffnessModel::taut) {
+      if (!(c > 0)) return;
+      share = profile.strain(c) / c;
+      if (share < 0 && model != StiffnessModel::exact) share = 0;
+      if (share < 1) visit_term(k * (1 - share) / (c * c), s.gradient);
+    }
+    kind.visit_stiffness(
+        s.points, model != StiffnessModel::exact,
+        [&](int i, Real value) { visit_block(i, i, Matrix3::Identity() * (k * share * value)); },
+        [&](Real coefficient, const Gradient<num_points>& mode) { visit_term(k * share * coefficient, mode); });
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const {
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
+    const Stencil& stencil = stencils_[e];
+    if constexpr (is_structured) {
+      visit_structured(
+          e, s, model, [&](int i, int j, const Matrix3& block) { stiffness.add_block(stencil[i], stencil[j], block); },
+          [](Real, const Gradient<num_points>&) {});
+    } else {
+      const Hessian<num_points> k = stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e));
+      const int n = static_cast<int>(stencil.size());
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j)
+          stiffness.add_block(stencil[i], stencil[j], k.template block<3, 3>(3 * i, 3 * j));
+    }
+  });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::append_pattern(std::vector<std::pair<int, int>>& pattern) const {
+  for (std::size_t e = 0; e < stencils_.size(); ++e) {
+    const Stencil& stencil = stencils_[e];
+    if constexpr (is_structured) {
+      if constexpr (HasSparseHessian<Kind>)
+        kinds_[e].visit_hessian_pattern([&](int i, int j) { pattern.emplace_back(stencil[i], stencil[j]); });
+      // The diagonal is in every pattern.
+    } else {
+      for (const int row : stencil)
+        for (const int column : stencil) pattern.emplace_back(row, column);
+    }
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const {
+  if constexpr (is_structured)
+    for_each_enabled(x, [&](std::size_t e, auto& s) {
+      visit_structured(
+          e, s, model, [](int, int, const Matrix3&) {},
+          [&](Real coefficient, const Gradient<num_points>& mode) { terms.push_back({coefficient, stencils_[e], mode}); });
+    });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
+                                        Forces df) const {
+  const bool bare = model == StiffnessModel::gauss_newton || model == StiffnessModel::taut;
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
+    gather(e, dx, s.vectors);
+    const Stencil& stencil = stencils_[e];
+    if constexpr (is_structured) {
+      visit_structured(
+          e, s, model,
+          [&](int i, int j, const Matrix3& block) {
+            df.col(stencil[i]).template head<3>() += scale * (block * s.vectors.col(j));
+          },
+          [&](Real coefficient, const Gradient<num_points>& mode) {
+            scatter(e, mode, scale * coefficient * mode.cwiseProduct(s.vectors).sum(), df);
+          });
+    } else if (Constraint<Kind> && bare) {
+      if constexpr (Constraint<Kind>) {
+        const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
+        if (is_slack(e, c, model)) return;
+        Real dc = 0;
+        for (Eigen::Index k = 0; k < s.gradient.cols(); ++k) dc += s.gradient.col(k).dot(s.vectors.col(k));
+        scatter(e, s.gradient, scale * stiffnesses_[e] * dc, df);
+      }
+    } else {
+      s.gradient.reshaped() =
+          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e)) * s.vectors.reshaped();
+      scatter(e, s.gradient, scale, df);
+    }
+  });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const {
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
+    const Stencil& stencil = stencils_[e];
+    if constexpr (is_structured) {
+      visit_structured(
+          e, s, StiffnessModel::gauss_newton,
+          [&](int i, int j, const Matrix3& block) {
+            if (i == j) diagonal.col(stencil[i]).template head<3>() += scale * block.diagonal();
+          },
+          [&](Real coefficient, const Gradient<num_points>& mode) {
+            scatter(e, mode.cwiseAbs2(), scale * coefficient, diagonal);
+          });
+    } else if constexpr (Constraint<Kind>) {
+      const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
+      if (!is_slack(e, c, StiffnessModel::gauss_newton))
+        scatter(e, s.gradient.cwiseAbs2(), scale * stiffnesses_[e], diagonal);
+    } else {
+      const Hessian<num_points> k =
+          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, StiffnessModel::gauss_newton, profile(e));
+      s.gradient.reshaped() = k.diagonal();
+      scatter(e, s.gradient, scale, diagonal);
+    }
+  });
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_stiffness_bounds(const Positions& x, std::span<Real> bounds) const {
+  for_each_enabled(x, [&](std::size_t e, auto& s) {
+    const Stencil& stencil = stencils_[e];
+    const auto add_rank_one = [&](Real coefficient, const Gradient<num_points>& mode) {
+      const Real sum = mode.colwise().norm().sum();
+      for (Eigen::Index k = 0; k < mode.cols(); ++k)
+        bounds[stencil[k]] += std::abs(coefficient) * sum * mode.col(k).norm();
+    };
+    if constexpr (is_structured) {
+      visit_structured(
+          e, s, StiffnessModel::taut,
+          [&](int i, int, const Matrix3& block) { bounds[stencil[i]] += block.norm() / std::sqrt(3.0); },
+          [&](Real coefficient, const Gradient<num_points>& mode) {
+            if (coefficient > 0) add_rank_one(coefficient, mode);  // the others only lower the eigenvalues
+          });
+    } else if constexpr (Constraint<Kind>) {
+      s.gradient = kinds_[e].gradient(s.points);
+      add_rank_one(stiffnesses_[e], s.gradient);
+    } else {
+      const Hessian<num_points> k =
+          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, StiffnessModel::taut, profile(e));
+      const int n = static_cast<int>(stencil.size());
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) bounds[stencil[i]] += k.template block<3, 3>(3 * i, 3 * j).norm();
+    }
+  });
+}
+
+}  // namespace penalty

@@ -1,0 +1,87 @@
+// Projected Newton's method with a line search: the engine of the implicit step and of static relaxation.
+#pragma once
+#include "penalty/stepping/linear_solver.h"
+
+namespace penalty {
+
+/// What is minimised over the positions of the particles that are not fixed:
+///
+///     Phi(x) = E(x) + sum_i w_i/2 |x_i - t_i|² - sum_i f_i . x_i + (x - x0)ᵀ D (x - x0) / 2
+///
+/// E is the potential; the implicit step has w_i = m_i / h² and t_i where particle i would be without forces; damping
+/// has D = damping matrix / h at x0, where the step began. Whatever is empty is left out.
+struct Objective {
+  const Potential* potential = nullptr;
+  std::vector<Real> weights;   // w_i [N/m]
+  PackedVectors targets;       // t_i [m]
+  PackedVectors loads;         // f_i [N]
+  PackedVectors damped_from;   // x0 [m]; empty: no damping
+  Real damping_time = 0;       // of the elements, besides their own [s]
+  Real inverse_duration = 0;   // 1 / h [1/s]
+};
+
+/// One iteration, from x to x + length * d.
+struct NewtonIteration {
+  Real before = 0, after = 0;  // dPhi . P⁻¹ dPhi, P the preconditioner: about twice what Phi could still fall by [J]
+  Real displacement = 0;       // largest |d_i| [m]
+  Real length = 0;             // 0: no way down was found
+  int linear_iterations = 0;
+};
+
+/// Minimises by Newton's method: the stiffness of every element is projected on the positive semidefinite matrices, so that
+/// each direction leads downhill, and the line search makes sure that Phi falls, or, where that is lost in round-off, its slope. Deterministic, and without allocation
+/// once the pattern is made, but for elements of many points.
+class NewtonSolver {
+ public:
+  /// Makes the pattern of the matrix: once, and after elements were added.
+  void set_pattern(const Potential& potential, int num_particles);
+  bool has_pattern_of(const Potential& potential) const { return potential_ == &potential && elements_ == potential.num_elements(); }
+
+  /// Particles that do not move; to be added in ascending order.
+  void clear_fixed() { system_.fixed.clear(); }
+  void fix(int particle) { system_.fixed.push_back(particle); }
+  const std::vector<int>& fixed() const { return system_.fixed; }
+
+  /// To be filled in before `prepare`, which makes the damping matrix.
+  Objective objective;
+  void prepare();
+
+  LinearOptions linear;
+  /// Share of the mean stiffness that is added to the diagonal: what has no inertia may be free to move.
+  Real regularization = 0;
+
+  /// Begins at `x`, or, if Phi is less there, moves to `x`.
+  void start(const PackedVectors& x);
+  void offer(const PackedVectors& x);
+  NewtonIteration iterate();
+
+  const PackedVectors& positions() const { return here_.positions; }
+  const PackedVectors& forces() const { return here_.forces; }      // -dE/dx [N]
+  const PackedVectors& gradient() const { return here_.gradient; }  // dPhi/dx, zero of fixed particles [N]
+  Real elastic_energy() const { return here_.elastic_energy; }      // E [J]
+  Real value() const { return here_.value; }                        // Phi [J]
+
+  /// (x - x0)ᵀ D (x - x0): what damping has taken since x0, were it linear on the way [J].
+  Real damping_work() const { return 2 * here_.damping; }
+
+ private:
+  struct State {
+    PackedVectors positions, forces, gradient;
+    Real elastic_energy = 0, damping = 0, value = 0;
+    Real magnitude = 0;  // of the terms of the value: what round-off is measured by
+  };
+
+  void evaluate(State& state);
+  void assemble();
+
+  const Potential* potential_ = nullptr;
+  std::size_t elements_ = 0;
+  LinearSystem system_{BlockMatrix(0, {}), {}, {}};
+  LinearSystem damping_{BlockMatrix(0, {}), {}, {}};
+  LinearSolver solver_;
+  State here_, trial_;
+  Real energy_noise_ = 0;  // of the potential, a guess [J]
+  PackedVectors direction_, displacement_, damping_force_;
+};
+
+}  // namespace penalty

@@ -1,9 +1,0 @@
-// One step of one body by backward Euler.
-#pragma once
-#include "penalty/solvers/step.h"
-
-namespace penalty {
-
-void advance_implicitly(SteppedBody& body, Real duration);
-
-}  // namespace penalty

@@ -1,0 +1,145 @@
+#include "penalty/stepping/newton.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace penalty {
+namespace {
+
+constexpr Real sufficient = 1e-4;     // share of the predicted fall that a step has to keep (Armijo)
+constexpr int most_backtracks = 30;
+constexpr Real round_off = 1e-13;     // of the terms of Phi: below it the slope decides instead
+constexpr Real epsilon = 1e-16;
+
+}  // namespace
+
+void NewtonSolver::set_pattern(const Potential& potential, int num_particles) {
+  potential_ = &potential;
+  elements_ = potential.num_elements();
+  std::vector<std::pair<int, int>> pattern;
+  potential.append_pattern(pattern);
+  system_.matrix = BlockMatrix(num_particles, std::move(pattern));
+  damping_.matrix = system_.matrix;
+  solver_.set_pattern(system_.matrix);
+  for (PackedVectors* v : {&here_.positions, &here_.forces, &here_.gradient, &trial_.positions, &trial_.forces,
+                           &trial_.gradient, &direction_, &displacement_, &damping_force_})
+    v->setZero(4, num_particles);
+}
+
+void NewtonSolver::evaluate(State& state) {
+  const PackedVectors& x = state.positions;
+  state.forces.setZero();
+  state.elastic_energy = objective.potential->add_forces(x, state.forces);
+  state.gradient = -state.forces;
+  state.value = state.elastic_energy;
+  state.magnitude = state.elastic_energy;
+  if (!objective.weights.empty()) {
+    Real inertia = 0;
+    for (Eigen::Index i = 0; i < x.cols(); ++i) {
+      const Real w = objective.weights[static_cast<std::size_t>(i)];
+      const Vector3 d = (x.col(i) - objective.targets.col(i)).head<3>();
+      inertia += w * d.squaredNorm();
+      state.gradient.col(i).head<3>() += w * d;
+    }
+    state.value += inertia / 2;
+    state.magnitude += inertia / 2;
+  }
+  if (objective.loads.size() != 0) {
+    const Real work = objective.loads.cwiseProduct(x).sum();
+    state.gradient -= objective.loads;
+    state.value -= work;
+    state.magnitude += objective.loads.cwiseProduct(x).cwiseAbs().sum();
+  }
+  state.damping = 0;
+  if (objective.damped_from.size() != 0) {
+    displacement_ = x - objective.damped_from;
+    damping_.multiply(displacement_, damping_force_);
+    state.damping = displacement_.cwiseProduct(damping_force_).sum() / 2;
+    state.gradient += damping_force_;
+    state.value += state.damping;
+    state.magnitude += state.damping;
+  }
+  system_.clear_fixed(state.gradient);
+}
+
+void NewtonSolver::prepare() {
+  if (objective.damped_from.size() != 0) {
+    damping_.matrix.set_zero();
+    damping_.terms.clear();
+    const Real time = objective.damping_time;
+    objective.potential->add_damping(objective.damped_from, time, damping_.matrix);
+    objective.potential->append_damping_terms(objective.damped_from, time, damping_.terms);
+    damping_.matrix.scale(objective.inverse_duration);
+    for (RankOneTerm& term : damping_.terms) term.coefficient *= objective.inverse_duration;
+  }
+}
+
+void NewtonSolver::start(const PackedVectors& x) {
+  here_.positions = x;
+  evaluate(here_);
+}
+
+void NewtonSolver::offer(const PackedVectors& x) {
+  trial_.positions = x;
+  evaluate(trial_);
+  if (trial_.value < here_.value || std::isnan(here_.value)) std::swap(here_, trial_);
+}
+
+void NewtonSolver::assemble() {
+  BlockMatrix& matrix = system_.matrix;
+  matrix.set_zero();
+  system_.terms.clear();
+  objective.potential->add_stiffness(here_.positions, StiffnessModel::psd_projected, matrix);
+  objective.potential->append_rank_one_terms(here_.positions, StiffnessModel::psd_projected, system_.terms);
+  if (objective.damped_from.size() != 0) {
+    matrix.add(damping_.matrix, 1);
+    system_.terms.insert(system_.terms.end(), damping_.terms.begin(), damping_.terms.end());
+  }
+  const int num_particles = matrix.num_particles();
+  Real stiffness = 0;
+  for (int i = 0; i < num_particles; ++i) stiffness += matrix.diagonal(i).trace() / 3;
+  const Real shift = regularization * stiffness / std::max(num_particles, 1);
+  // A turned body has F far from 1, and energies of elements that are small differences of large numbers.
+  const auto x = here_.positions.topRows<3>();
+  energy_noise_ = epsilon * stiffness * (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).squaredNorm();
+  for (int i = 0; i < num_particles; ++i) {
+    const Real weight = objective.weights.empty() ? 0 : objective.weights[i];
+    matrix.add_to_diagonal(i, weight + shift);
+  }
+}
+
+NewtonIteration NewtonSolver::iterate() {
+  NewtonIteration iteration;
+  assemble();
+  solver_.factorize(system_, here_.positions);
+  displacement_ = -here_.gradient;
+  const LinearReport solved = solver_.solve(system_, displacement_, linear, direction_);
+  iteration.linear_iterations = solved.iterations;
+  iteration.before = solved.squared_norm;
+  const Real slope = here_.gradient.cwiseProduct(direction_).sum();
+  if (!(slope < 0)) return iteration;
+  iteration.displacement = std::sqrt(direction_.colwise().squaredNorm().maxCoeff());
+
+  Real length = 1;
+  for (int k = 0; k < most_backtracks; ++k) {
+    trial_.positions = here_.positions + length * direction_;
+    evaluate(trial_);
+    const Real fall = here_.value - trial_.value;
+    const Real new_slope = trial_.gradient.cwiseProduct(direction_).sum();
+    const bool falls = fall >= -sufficient * length * slope;
+    const bool flat =
+        std::abs(fall) <= round_off * here_.magnitude + energy_noise_ && std::abs(new_slope) < -0.9 * slope;
+    if (falls || flat) {
+      std::swap(here_, trial_);
+      iteration.length = length;
+      iteration.after = solver_.squared_norm(system_, here_.gradient);
+      return iteration;
+    }
+    // The parabola through both values and the first slope, within reason.
+    const Real parabola = -slope * length / (2 * (-fall / length - slope));
+    length = std::isfinite(parabola) ? std::clamp(parabola, 0.1 * length, 0.5 * length) : 0.1 * length;
+  }
+  return iteration;
+}
+
+}  // namespace penalty

@@ -1,0 +1,81 @@
+#include "penalty/stepping/stable_step.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace penalty {
+namespace {
+
+constexpr int largest_krylov_dimension = 60;
+constexpr Real wanted_residual = 0.002;  // of the Ritz value: a tenth of a per cent in frequency
+
+// A start vector without symmetry, the same on every machine.
+Eigen::VectorXd start_vector(Eigen::Index size) {
+  Eigen::VectorXd v(size);
+  std::uint64_t state = 0x9e3779b97f4a7c15;
+  for (Real& value : v) {
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    value = static_cast<Real>(state >> 11) * 0x1p-53 - 0.5;
+  }
+  return v;
+}
+
+}  // namespace
+
+Real gershgorin_bound(const Potential& potential, const Positions& x, std::span<const Real> inverse_masses) {
+  std::vector<Real> bounds(inverse_masses.size(), 0);
+  potential.add_stiffness_bounds(x, bounds);
+  Real largest = 0;
+  for (std::size_t i = 0; i < bounds.size(); ++i) largest = std::max(largest, bounds[i] * inverse_masses[i]);
+  return largest;
+}
+
+Real largest_eigenvalue_bound(const Potential& potential, const Positions& x, std::span<const Real> inverse_masses) {
+  const Real ceiling = gershgorin_bound(potential, x, inverse_masses);
+  const auto num_particles = static_cast<Eigen::Index>(inverse_masses.size());
+  if (!(ceiling > 0)) return ceiling;
+
+  // Lanczos on S K S with S = M^-1/2, which is symmetric and has the eigenvalues of M^-1 K.
+  Eigen::ArrayXd scale(3 * num_particles);
+  for (Eigen::Index i = 0; i < num_particles; ++i) scale.segment<3>(3 * i).setConstant(std::sqrt(inverse_masses[i]));
+  PackedVectors in = PackedVectors::Zero(4, num_particles), out(4, num_particles);
+  const auto apply = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    in.topRows<3>() = (v.array() * scale).matrix().reshaped(3, num_particles);
+    out.setZero();
+    potential.add_stiffness_product(x, StiffnessModel::taut, in, 1, out);
+    return (out.topRows<3>().reshaped().array() * scale).matrix();
+  };
+
+  Eigen::VectorXd q = (start_vector(3 * num_particles).array() * (scale > 0).cast<Real>()).matrix();
+  q.normalize();
+  const int dimension = static_cast<int>(std::min<Eigen::Index>(largest_krylov_dimension, 3 * num_particles));
+  Eigen::MatrixXd basis(3 * num_particles, dimension);
+  Eigen::VectorXd diagonal(dimension), off_diagonal(dimension);
+  Real bound = ceiling;
+  for (int k = 0; k < dimension; ++k) {
+    basis.col(k) = q;
+    Eigen::VectorXd r = apply(q);
+    diagonal[k] = q.dot(r);
+    // Full orthogonalisation, twice: cheap at this dimension, and Ritz values never come twice.
+    for (int pass = 0; pass < 2; ++pass)
+      r -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * r).eval();
+    off_diagonal[k] = r.norm();
+    const bool exhausted = off_diagonal[k] <= 1e-12 * ceiling;
+    if (exhausted || k + 1 == dimension || k % 5 == 4) {
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
+      ritz.computeFromTridiagonal(diagonal.head(k + 1), off_diagonal.head(k), Eigen::ComputeEigenvectors);
+      const Real value = ritz.eigenvalues()[k];
+      const Real residual = off_diagonal[k] * std::abs(ritz.eigenvectors()(k, k));
+      bound = std::min(ceiling, value + residual);
+      if (exhausted || residual <= wanted_residual * value) break;
+    }
+    q = r / off_diagonal[k];
+  }
+  return bound;
+}
+
+}  // namespace penalty

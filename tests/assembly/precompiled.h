@@ -1,4 +1,0 @@
-// What the tests of kinds and fields include besides; see ../precompiled.h.
-#include "../precompiled.h"
-#include "penalty/assembly/potential_field.h"
-#include "penalty/mesh/builders.h"

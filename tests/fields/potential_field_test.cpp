@@ -1,0 +1,257 @@
+// A field is the sum of its batches, and its derivatives agree with each other and with differences.
+#include "penalty/fields/potential_field.h"
+
+#include "fields/meshes.h"
+#include "math/eigenvalues.h"
+
+namespace penalty::testing {
+namespace {
+
+constexpr StiffnessModel all_models[] = {StiffnessModel::gauss_newton, StiffnessModel::exact,
+                                         StiffnessModel::psd_projected};
+
+struct Body {
+  TetMesh mesh;
+  PotentialField field;
+  PackedVectors x;
+
+  static Body random(unsigned seed) {
+    Random random(seed);
+    TetMesh mesh = noisy_box({2, 2, 1}, 0.5, 0.1, random);
+    PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1e3, .poisson = 0.4});
+    PackedVectors x = deformed(field.rest_positions(), 0.03, random);
+    return {std::move(mesh), std::move(field), std::move(x)};
+  }
+  Eigen::Index size() const { return x.cols(); }
+  PackedVectors forces(const PackedVectors& at) const {
+    PackedVectors f = PackedVectors::Zero(4, size());
+    field.add_forces(at, f);
+    return f;
+  }
+};
+
+TEST(PotentialField, IsTheSumOfItsBatches) {
+  const Body b = Body::random(1);
+  ASSERT_EQ(b.field.potentials().size(), 2u);
+  Random random(2);
+  const PackedVectors v = random_packed(b.size(), 1, random);
+  const std::vector<Real> inverse_masses = random_inverse_masses(b.size(), random);
+  const auto none = [&] { return PackedVectors(PackedVectors::Zero(4, b.size())); };
+  PackedVectors f = none(), damping = none(), product = none(), diagonal = none(), dissipated = v;
+  std::vector<Real> values, bounds(b.size(), 0.0);
+  Real energy = 0;
+  std::size_t elements = 0;
+  Eigen::MatrixXd k = Eigen::MatrixXd::Zero(3 * b.size(), 3 * b.size());
+  for (const auto& batch : b.field.potentials()) {
+    energy += batch->add_forces(b.x, f);
+    batch->add_damping_forces(b.x, v, 0.1, damping);
+    batch->add_stiffness_product(b.x, StiffnessModel::exact, v, 2, product);
+    batch->add_stiffness_diagonal(b.x, 3, diagonal);
+    batch->add_stiffness_bounds(b.x, bounds);
+    batch->dissipate(b.x, inverse_masses, 0.1, 0.1, dissipated);
+    batch->append_strains(b.x, values);
+    elements += batch->num_elements();
+    k += assembled(*batch, b.x, StiffnessModel::exact).to_dense();
+  }
+  PackedVectors sum_f = none(), sum_damping = none(), sum_product = none(), sum_diagonal = none(), sum_dissipated = v;
+  std::vector<Real> sum_values, sum_bounds(b.size(), 0.0);
+  EXPECT_GT(energy, 0);
+  EXPECT_DOUBLE_EQ(b.field.add_forces(b.x, sum_f), energy);
+  EXPECT_DOUBLE_EQ(b.field.energy(b.x), energy);
+  b.field.add_damping_forces(b.x, v, 0.1, sum_damping);
+  b.field.add_stiffness_product(b.x, StiffnessModel::exact, v, 2, sum_product);
+  b.field.add_stiffness_diagonal(b.x, 3, sum_diagonal);
+  b.field.add_stiffness_bounds(b.x, sum_bounds);
+  b.field.dissipate(b.x, inverse_masses, 0.1, 0.1, sum_dissipated);
+  b.field.append_strains(b.x, sum_values);
+  for (const PackedVectors* value : {&f, &damping, &product, &diagonal}) ASSERT_GT(value->norm(), 0);
+  EXPECT_EQ(sum_f, f);
+  EXPECT_EQ(sum_damping, damping);
+  EXPECT_EQ(sum_product, product);
+  EXPECT_EQ(sum_diagonal, diagonal);
+  EXPECT_EQ(sum_bounds, bounds);
+  EXPECT_EQ(sum_dissipated, dissipated);
+  EXPECT_EQ(sum_values, values);
+  EXPECT_EQ(b.field.num_elements(), elements);
+  EXPECT_EQ(values.size(), elements);
+  EXPECT_LT(relative_error(assembled(b.field, b.x, StiffnessModel::exact).to_dense(), k), 1e-15);
+}
+
+TEST(PotentialField, RestsInItsRestShape) {
+  const Body b = Body::random(3);
+  EXPECT_LT(b.field.energy(b.field.rest_positions()), 1e-25);
+  EXPECT_LT(b.forces(b.field.rest_positions()).norm(), 1e-11);
+  EXPECT_GT(b.forces(b.x).norm(), 1);
+}
+
+TEST(PotentialField, ForcesAreMinusTheDerivativeOfTheEnergy) {
+  WorstError error;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    const Body b = Body::random(seed);
+    const PackedVectors f = b.forces(b.x);
+    PackedVectors differences = PackedVectors::Zero(4, b.size()), x = b.x;
+    const Real step = 1e-6;
+    for (Eigen::Index i = 0; i < b.size(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        x(axis, i) = b.x(axis, i) + step;
+        const Real above = b.field.energy(x);
+        x(axis, i) = b.x(axis, i) - step;
+        differences(axis, i) = -(above - b.field.energy(x)) / (2 * step);
+        x(axis, i) = b.x(axis, i);
+      }
+    ASSERT_GT(f.norm(), 0);
+    error.see(relative_error(differences, f), seed);
+  }
+  error.expect_below(1e-7, "relative error");
+}
+
+TEST(PotentialField, ForcesHaveNoNetForceAndNoNetTorque) {
+  WorstError net, torque;
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    const Body b = Body::random(seed);
+    const PackedVectors f = b.forces(b.x);
+    Vector3 sum = Vector3::Zero();
+    for (Eigen::Index i = 0; i < b.size(); ++i) sum += b.x.col(i).head<3>().cross(f.col(i).head<3>());
+    const Real scale = f.colwise().norm().sum();
+    net.see(f.rowwise().sum().norm() / scale, seed);
+    torque.see(sum.norm() / (scale * b.x.colwise().norm().maxCoeff()), seed);
+  }
+  net.expect_below(1e-14, "net force");
+  torque.expect_below(1e-14, "net torque");
+}
+
+TEST(PotentialField, DifferentialOfTheForcesIsTheStiffnessTimesTheDisplacement) {
+  WorstError matrix_error, difference_error;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const Body b = Body::random(seed);
+    Random random(seed + 100);
+    const PackedVectors dx = random_packed(b.size(), 1, random);
+    for (const StiffnessModel model : all_models) {
+      PackedVectors from_matrix = PackedVectors::Zero(4, b.size()), matrix_free = from_matrix;
+      assembled(b.field, b.x, model).add_product(dx, -0.5, from_matrix);
+      b.field.add_stiffness_product(b.x, model, dx, -0.5, matrix_free);
+      ASSERT_GT(from_matrix.norm(), 0);
+      matrix_error.see(relative_error(matrix_free, from_matrix), seed);
+      if (model == StiffnessModel::exact) {
+        const Real step = 1e-6;
+        const PackedVectors df = b.forces(b.x + step * dx) - b.forces(b.x - step * dx);
+        difference_error.see(relative_error(df / (2 * step), 2 * from_matrix), seed);
+      }
+    }
+  }
+  matrix_error.expect_below(1e-13, "product and matrix");
+  difference_error.expect_below(1e-8, "product and differences");
+}
+
+TEST(PotentialField, AssembledStiffnessIsSymmetricAndSemidefiniteWhereItShouldBe) {
+  int indefinite = 0;
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Body b = Body::random(seed);
+    for (const StiffnessModel model : all_models) {
+      const Eigen::MatrixXd k = assembled(b.field, b.x, model).to_dense();
+      EXPECT_LT((k - k.transpose()).norm(), 1e-14 * k.norm());
+      const Real smallest = smallest_eigenvalue(k);
+      if (model == StiffnessModel::exact)
+        indefinite += smallest < -1e-3 * k.norm();
+      else
+        EXPECT_GT(smallest, -1e-13 * k.norm());
+    }
+  }
+  EXPECT_GT(indefinite, 0);
+}
+
+TEST(PotentialField, DiagonalIsThatOfTheGaussNewtonStiffness) {
+  const Body b = Body::random(4);
+  PackedVectors diagonal = PackedVectors::Constant(4, b.size(), 1);
+  b.field.add_stiffness_diagonal(b.x, 2, diagonal);
+  const Eigen::VectorXd expected = assembled(b.field, b.x, StiffnessModel::gauss_newton).to_dense().diagonal();
+  ASSERT_GT(expected.minCoeff(), 0);
+  EXPECT_LT(relative_error((diagonal.topRows<3>().array() - 1).matrix().reshaped() / 2, expected), 1e-14);
+}
+
+TEST(PotentialField, BoundsAreNeverBelowTheLargestEigenvalue) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Body b = Body::random(seed);
+    Random random(seed);
+    for (const PackedVectors& x : {b.x, b.field.rest_positions()}) {
+      const std::vector<Real> inverse_masses = random_inverse_masses(b.size(), random);
+      std::vector<Real> bounds(b.size(), 0.0);
+      b.field.add_stiffness_bounds(x, bounds);
+      Real bound = 0;
+      for (Eigen::Index i = 0; i < b.size(); ++i) bound = std::max(bound, bounds[i] * inverse_masses[i]);
+      const Real largest = true_largest_eigenvalue(b.field, x, inverse_masses);
+      EXPECT_GE(bound, largest);
+      EXPECT_LE(bound, 9 * largest);  // nor uselessly far above: the substep is at most three times too small
+    }
+  }
+}
+
+TEST(PotentialField, FindGivesTheBatchOfAKindOrNull) {
+  PotentialField field(Eigen::Matrix3Xd::Identity(3, 3));
+  EXPECT_EQ(field.find<Length>(), nullptr);
+  const std::vector<Edge> edges{{0, 1}, {1, 2}};
+  const Batch<Length>& added = field.add<Length>(edges, 2);
+  EXPECT_EQ(field.find<Length>(), &added);
+  EXPECT_EQ(field.find<TetrahedronVolume>(), nullptr);
+  EXPECT_EQ(added.stiffnesses(), (std::vector<Real>{2, 2}));
+  EXPECT_NEAR(added.kinds()[0].rest_length(), std::sqrt(2.0), 1e-15);
+}
+
+TEST(PotentialField, PositionsThatAreNotFiniteGiveAnEnergyThatIsNotFinite) {
+  const Body b = Body::random(5);
+  for (const Real bad : {std::nan(""), std::numeric_limits<Real>::infinity()}) {
+    PackedVectors x = b.x;
+    x(1, 4) = bad;
+    EXPECT_FALSE(std::isfinite(b.field.energy(x)));
+    EXPECT_FALSE(b.forces(x).allFinite());
+  }
+}
+
+// What a field of three points on a line, one tetrahedron beside it and a stencil list says.
+template <class Kind>
+std::string refusal(const std::vector<std::array<int, Kind::num_points>>& stencils,
+                    const std::vector<Real>& stiffnesses) {
+  Eigen::Matrix3Xd rest(3, 5);
+  rest << 0, 1, 0, 0, 0,  //
+      0, 0, 1, 0, 0,      //
+      0, 0, 0, 1, 0;      // particles 0 and 4 coincide
+  PotentialField field(rest);
+  const std::string message = complaint<std::invalid_argument>([&] { field.add<Kind>(stencils, stiffnesses); });
+  EXPECT_TRUE(field.potentials().empty()) << "a refused batch was added";
+  return message;
+}
+
+TEST(PotentialField, RefusedElementsNameKindElementIndexAndValue) {
+  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 9}}, {1, 1}), "length 1: index 9 is outside the 5 particles");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {-2, 1}}, {1, 1}), "length 1: index -2 is outside the 5 particles");
+  EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 5}}, {1}),
+            "tetrahedron volume 0: index 5 is outside the 5 particles");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1, -3}),
+            "length 1: stiffness is -3 J, must be positive and finite");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}, {2, 3}}, {1, 1, std::nan("")}),
+            "length 2: stiffness is nan J, must be positive and finite");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {0, 4}}, {1, 1}), "length 1: length: rest length is 0");
+  EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 3}, {0, 1, 2, 4}}, {1, 1}),
+            "tetrahedron volume 1: tetrahedron volume: rest volume is 0");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1}), "length: 1 stiffnesses for 2 stencils");
+}
+
+TEST(PotentialField, ARepeatedIndexIsNamedAndNotReportedAsAZeroRestValue) {
+  EXPECT_EQ(refusal<Length>({{0, 1}, {2, 2}}, {1, 1}), "length 1: index 2 appears twice");
+  EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 1}}, {1}), "tetrahedron volume 0: index 1 appears twice");
+}
+
+TEST(PotentialField, RefusesRestPositionsThatAreNotFinite) {
+  Eigen::Matrix3Xd rest = Eigen::Matrix3Xd::Zero(3, 4);
+  rest(1, 2) = std::nan("");
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { PotentialField field(rest); }),
+            "field: rest position 2: coordinate y is nan");
+  PotentialField empty(Eigen::Matrix3Xd(3, 0));
+  EXPECT_EQ(empty.num_particles(), 0);
+  EXPECT_THROW(empty.add(nullptr), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace penalty::testing

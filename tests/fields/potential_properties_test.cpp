@@ -1,0 +1,520 @@
+// The laws that every potential obeys: each kind and material, plain and under each modifier, through the interface that
+// the solvers see. A new kind needs one line in `kinds()`, a new modifier one in `modifiers()`.
+#include <functional>
+
+#include "fields/meshes.h"
+#include "kinds/samples.h"
+#include "math/eigenvalues.h"
+#include "penalty/kinds/user_constraint.h"
+#include "penalty/stepping/linear_solver.h"
+
+namespace penalty::testing {
+namespace {
+
+constexpr unsigned num_states = 200;
+
+/// One element over all its particles, at rest in `rest`; throws std::invalid_argument for a rest shape that it refuses.
+struct KindCase {
+  std::string name;
+  int num_points;
+  std::function<ElementBatch&(PotentialField& field, Real stiffness)> add;
+  bool conserves_momentum = true;
+  bool has_sign = true;  // energies of their own have none
+  bool has_exact_stiffness = true;
+};
+
+template <class Kind>
+Kind prototype_of() {
+  if constexpr (std::is_same_v<Kind, StableNeoHookean>)
+    return StableNeoHookean::with_ratio(1.5);
+  else if constexpr (std::is_same_v<Kind, Attachment>)
+    return Attachment::of_length(0.4);
+  else
+    return prototype<Kind>(1);
+}
+
+template <class Kind>
+KindCase own_kind() {
+  constexpr int n = Kind::num_points;
+  return {std::string(Kind::name), n,
+          [](PotentialField& field, Real k) -> ElementBatch& {
+            std::array<int, static_cast<std::size_t>(n)> stencil;
+            for (int i = 0; i < n; ++i) stencil[i] = i;
+            return field.add(prototype_of<Kind>(), std::span(&stencil, 1), k);
+          },
+          conserves_momentum<Kind>, Constraint<Kind>, HasHessian<Kind> || ElasticEnergy<Kind>};
+}
+
+template <class Kind>
+KindCase group_kind(std::string name, const Kind& prototype, int n) {
+  return {std::move(name), n,
+          [prototype, n](PotentialField& field, Real k) -> ElementBatch& {
+            std::vector<int> stencil(n);
+            for (int i = 0; i < n; ++i) stencil[i] = i;
+            return field.add(prototype, std::span(&stencil, 1), k);
+          },
+          true, Constraint<Kind>, HasHessian<Kind> || ElasticEnergy<Kind>};
+}
+
+template <class... Kinds>
+void append_own(std::vector<KindCase>& cases, KindList<Kinds...>) {
+  (cases.push_back(own_kind<Kinds>()), ...);
+}
+
+const std::vector<KindCase>& kinds() {
+  static const std::vector<KindCase> cases = [] {
+    std::vector<KindCase> list;
+    append_own(list, AllKinds{});
+    const std::vector<std::array<int, 3>> octahedron{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                                                     {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+    list.push_back(group_kind("enclosed volume", EnclosedVolume(octahedron), 6));
+    list.push_back(group_kind("shape match", ShapeMatch(), 7));
+    list.push_back(group_kind("weighted shape match", ShapeMatch({1, 2, 0.5, 3}), 4));
+    list.push_back(own_kind<StableNeoHookean>());
+    list.push_back(own_kind<Attachment>());
+    const auto product = [](const auto& p) {
+      return (p.col(1) - p.col(0)).squaredNorm() * (p.col(2) - p.col(0)).squaredNorm();
+    };
+    const auto fixed = differentiated_constraint<3>(product, RestValue::relative);
+    list.push_back({"user constraint, differentiated", 3, [fixed](PotentialField& field, Real k) -> ElementBatch& {
+                      const std::array<int, 3> stencil{0, 1, 2};
+                      return field.add(fixed, std::span(&stencil, 1), k);
+                    }});
+    const auto differenced = difference_constraint<3>(
+        [product](const Points<3>& p) -> Real { return product(p); }, RestValue::relative);
+    list.push_back({"user constraint, differences", 3,
+                    [differenced](PotentialField& field, Real k) -> ElementBatch& {
+                      const std::array<int, 3> stencil{0, 1, 2};
+                      return field.add(differenced, std::span(&stencil, 1), k);
+                    },
+                    true, true, false});
+    const auto polyline = [](const auto& p) {
+      auto sum = (p.col(1) - p.col(0)).squaredNorm();
+      for (int i = 2; i < p.cols(); ++i) sum += (p.col(i) - p.col(i - 1)).squaredNorm();
+      return sum;
+    };
+    list.push_back(group_kind("user constraint of any size, differentiated",
+                              differentiated_constraint<dynamic>(polyline, RestValue::relative), 5));
+    return list;
+  }();
+  return cases;
+}
+
+struct ModifierCase {
+  std::string name;
+  std::function<void(ElementBatch&)> apply;
+  bool needs_sign = false;  // of C, which an energy of its own does not have: it has no target and is never compressed
+};
+
+const std::vector<ModifierCase>& modifiers() {
+  static const std::vector<ModifierCase> cases{
+      {"plain", [](ElementBatch&) {}},
+      {"target", [](ElementBatch& b) { b.set_target(0, 0.2); }, true},
+      {"stretching only", [](ElementBatch& b) { b.set_free_play(0, -infinite, 0); }},
+      {"compression only", [](ElementBatch& b) { b.set_free_play(0, 0, infinite); }, true},
+      {"free between", [](ElementBatch& b) { b.set_free_play(0, -0.15, 0.25); }},
+      {"moved free play", [](ElementBatch& b) { b.set_target(0, -0.1), b.set_free_play(0, -0.1, 0.1); }, true},
+      {"plastic", [](ElementBatch& b) { b.set_plasticity({.yield = 0.1, .creep = 5, .limit = 1}); }, true},
+      {"breakable", [](ElementBatch& b) { b.set_breaking({.upper = 1e6}); }},
+      {"own stiffness", [](ElementBatch& b) { b.set_stiffness(0, 17); }},
+      {"own damping", [](ElementBatch& b) { b.set_damping_time(0, 0.3); }},
+      {"switched off and on", [](ElementBatch& b) { b.set_enabled(0, false), b.set_enabled(0, true); }}};
+  return cases;
+}
+
+/// An element in a deformed state.
+struct State {
+  const KindCase* kind;
+  PotentialField field;
+  ElementBatch* batch;
+  PackedVectors x, v, dx;
+  std::vector<Real> inverse_masses;
+  bool is_slack = false;
+};
+
+using Case = std::pair<const KindCase*, const ModifierCase*>;
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const KindCase& kind : kinds())
+    for (const ModifierCase& modifier : modifiers())
+      if (kind.has_sign || !modifier.needs_sign) all.emplace_back(&kind, &modifier);
+  return all;
+}
+
+std::vector<Case> cases_where(bool KindCase::* holds) {
+  std::vector<Case> some = cases();
+  std::erase_if(some, [holds](const Case& c) { return !(c.first->*holds); });
+  return some;
+}
+
+std::string case_name(const Case& c) {
+  std::string name = c.first->name + "_" + c.second->name;
+  for (char& letter : name)
+    if (!std::isalnum(static_cast<unsigned char>(letter))) letter = '_';
+  return name;
+}
+
+/// Derivative along one coordinate of whatever `f(x)` gives: five points, so that states close to a kink are differentiated
+/// as well as others.
+template <class Function>
+auto derivative(const Function& f, PackedVectors x, Eigen::Index i, int axis) {
+  const Real h = 2e-5, start = x(axis, i);
+  const auto at = [&](Real offset) {
+    x(axis, i) = start + offset;
+    return f(x);
+  };
+  using Result = decltype(f(x));
+  const Result near_above = at(h), near_below = at(-h), far_above = at(2 * h), far_below = at(-2 * h);
+  return Result((8 * (near_above - near_below) - (far_above - far_below)) / (12 * h));
+}
+
+class PotentialProperties : public ::testing::TestWithParam<Case> {
+ protected:
+  const KindCase& kind() const { return *GetParam().first; }
+  const ModifierCase& modifier() const { return *GetParam().second; }
+
+  // At rest, stretched, squeezed, turned, inverted, noisy; away from the kinks at the ends of free play and from points where
+  // the kind itself is singular.
+  State state(unsigned seed) const {
+    for (unsigned attempt = 0;; ++attempt) {
+      Random random(1000 * seed + attempt);
+      const int n = kind().num_points;
+      const Eigen::Matrix3Xd rest = random.vectors<Eigen::Dynamic>(n, 0.5);
+      Matrix3 stretch = Matrix3::Identity();
+      for (Real& entry : stretch.reshaped()) entry += random.uniform(-0.4, 0.4);
+      if (seed % 5 == 4) stretch.col(2) *= -1;
+      Eigen::Matrix3Xd moved = random.rotation() * stretch * rest;
+      moved += random.vectors<Eigen::Dynamic>(n, 0.1);
+      moved.colwise() += random.vector(1);
+      if (!kind().conserves_momentum) moved = rest + random.vectors<Eigen::Dynamic>(n, 0.3);
+      State s{.kind = &kind(), .field = PotentialField(rest), .batch = nullptr, .x = {}, .v = {}, .dx = {}, .inverse_masses = {}};
+      try {
+        s.batch = &kind().add(s.field, std::pow(10.0, random.uniform(-2, 4)));
+      } catch (const std::invalid_argument&) {
+        continue;
+      }
+      s.x = pack(moved);
+      std::vector<Real> bare;
+      s.batch->append_strains(s.x, bare);
+      PackedVectors f = PackedVectors::Zero(4, n);
+      s.batch->add_forces(s.x, f);
+      const Real k = s.batch->stiffness(0);
+      const Real gradient = f.colwise().norm().sum() / (k * std::abs(bare[0]));
+      if (!(gradient < 20) || !(std::abs(bare[0]) < 3)) continue;
+      modifier().apply(*s.batch);
+      const Real d = bare[0] - s.batch->target(0);
+      bool near_kink = false;
+      for (const Real kink : {-0.15, -0.1, 0.0, 0.1, 0.25}) near_kink = near_kink || std::abs(d - kink) < 0.01;
+      if (near_kink) continue;
+      std::vector<Real> strain;
+      s.batch->append_strains(s.x, strain);
+      s.is_slack = strain[0] == 0;
+      s.v = random_packed(n, 1, random);
+      s.dx = random_packed(n, 1, random);
+      s.inverse_masses = random_inverse_masses(n, random);
+      return s;
+    }
+  }
+
+  static PackedVectors forces(const Potential& potential, const PackedVectors& x) {
+    PackedVectors f = PackedVectors::Zero(4, x.cols());
+    potential.add_forces(x, f);
+    return f;
+  }
+
+  static Eigen::MatrixXd stiffness(const Potential& potential, const PackedVectors& x, StiffnessModel model) {
+    Eigen::MatrixXd k = assembled(potential, x, model).to_dense();
+    std::vector<RankOneTerm> terms;
+    potential.append_rank_one_terms(x, model, terms);
+    for (const RankOneTerm& term : terms) {
+      Eigen::VectorXd d = Eigen::VectorXd::Zero(k.rows());
+      for (std::size_t i = 0; i < term.particles.size(); ++i)
+        d.segment<3>(3 * term.particles[i]) += term.direction.col(static_cast<Eigen::Index>(i));
+      k += term.coefficient * d * d.transpose();
+    }
+    return k;
+  }
+
+  static std::string trace(unsigned seed) { return "seed " + std::to_string(seed); }
+};
+
+TEST_P(PotentialProperties, ForcesAreMinusTheDerivativeOfTheEnergy) {
+  WorstError error;
+  int taut = 0;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    const PackedVectors f = forces(s.field, s.x);
+    if (s.is_slack) {
+      EXPECT_EQ(f.norm(), 0) << trace(seed);
+      EXPECT_EQ(s.field.energy(s.x), 0) << trace(seed);
+      continue;
+    }
+    ++taut;
+    PackedVectors differences = PackedVectors::Zero(4, s.x.cols());
+    for (Eigen::Index i = 0; i < s.x.cols(); ++i)
+      for (int axis = 0; axis < 3; ++axis)
+        differences(axis, i) = -derivative([&](const PackedVectors& x) { return s.field.energy(x); }, s.x, i, axis);
+    error.see(relative_error(f, differences), seed);
+  }
+  EXPECT_GT(taut, static_cast<int>(num_states) / 20);
+  error.expect_below(1e-7, "force");
+}
+
+// Of kinds with a Hessian; that of the others is Gauss-Newton's.
+class ExactStiffness : public PotentialProperties {};
+
+TEST_P(ExactStiffness, IsMinusTheDerivativeOfTheForces) {
+  WorstError error, asymmetry;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    const Eigen::MatrixXd k = stiffness(s.field, s.x, StiffnessModel::exact);
+    if (s.is_slack) {
+      EXPECT_EQ(k.norm(), 0) << trace(seed);
+      continue;
+    }
+    Eigen::MatrixXd differences(k.rows(), k.cols());
+    for (Eigen::Index i = 0; i < s.x.cols(); ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        const PackedVectors column = derivative([&](const PackedVectors& x) { return forces(s.field, x); }, s.x, i, axis);
+        differences.col(3 * i + axis) = -column.topRows<3>().reshaped();
+      }
+    error.see(relative_error(k, differences), seed);
+    asymmetry.see(relative_error(k.transpose(), k), seed);
+  }
+  error.expect_below(1e-5, "stiffness");
+  asymmetry.expect_below(1e-12, "asymmetry");
+}
+
+TEST_P(PotentialProperties, ProductAndDiagonalAreThoseOfTheAssembledStiffness) {
+  WorstError product_error, diagonal_error;
+  for (unsigned seed = 0; seed < num_states / 4; ++seed) {
+    const State s = state(seed);
+    for (const StiffnessModel model : {StiffnessModel::gauss_newton, StiffnessModel::exact,
+                                       StiffnessModel::psd_projected, StiffnessModel::taut}) {
+      if (s.is_slack && model != StiffnessModel::taut) continue;
+      const Eigen::MatrixXd k = stiffness(s.field, s.x, model);
+      PackedVectors df = PackedVectors::Zero(4, s.x.cols());
+      s.field.add_stiffness_product(s.x, model, s.dx, 0.7, df);
+      const Eigen::VectorXd expected = 0.7 * k * s.dx.topRows<3>().reshaped();
+      product_error.see((df.topRows<3>().reshaped() - expected).norm() / (k.norm() * s.dx.norm()), seed);
+      EXPECT_GT(k.norm(), 0) << trace(seed);
+    }
+    if (s.is_slack) continue;
+    PackedVectors diagonal = PackedVectors::Zero(4, s.x.cols());
+    s.field.add_stiffness_diagonal(s.x, 2, diagonal);
+    diagonal_error.see(relative_error(diagonal.topRows<3>().reshaped(),
+                                      2 * stiffness(s.field, s.x, StiffnessModel::gauss_newton).diagonal()),
+                       seed);
+  }
+  product_error.expect_below(1e-13, "product");
+  diagonal_error.expect_below(1e-12, "diagonal");
+}
+
+TEST_P(PotentialProperties, ProjectedAndGaussNewtonStiffnessAreNeverNegative) {
+  WorstError negative;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    for (const StiffnessModel model :
+         {StiffnessModel::gauss_newton, StiffnessModel::psd_projected, StiffnessModel::taut}) {
+      const Eigen::MatrixXd k = stiffness(s.field, s.x, model);
+      if (k.norm() == 0) continue;
+      const Real smallest = smallest_eigenvalue(k);
+      negative.see(std::max(-smallest / k.norm(), 0.0), seed);
+    }
+  }
+  negative.expect_below(1e-12, "negative eigenvalue");
+}
+
+TEST_P(PotentialProperties, BoundsAreNoLessThanTheEigenvalueOfTheTautStiffness) {
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    const Eigen::MatrixXd k = stiffness(s.field, s.x, StiffnessModel::taut);
+    Eigen::VectorXd scale(k.rows());
+    for (Eigen::Index i = 0; i < s.x.cols(); ++i) scale.segment<3>(3 * i).setConstant(std::sqrt(s.inverse_masses[i]));
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * k * scale.asDiagonal();
+    const Real largest = symmetric_eigenvalues(scaled).maxCoeff();
+    ASSERT_GT(largest, 0);
+    std::vector<Real> bounds(s.inverse_masses.size(), 0);
+    s.field.add_stiffness_bounds(s.x, bounds);
+    Real bound = 0;
+    for (std::size_t i = 0; i < bounds.size(); ++i) bound = std::max(bound, bounds[i] * s.inverse_masses[i]);
+    EXPECT_GE(bound, largest * (1 - 1e-12)) << trace(seed);
+    EXPECT_LE(bound, 40 * largest) << trace(seed) << ": too loose to be of use";
+  }
+}
+
+// Of kinds that nothing outside holds.
+class InternalForces : public PotentialProperties {};
+
+TEST_P(InternalForces, HaveNoNetForceAndNoNetTorque) {
+  WorstError force, torque;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    PackedVectors damping = PackedVectors::Zero(4, s.x.cols());
+    s.field.add_damping_forces(s.x, s.v, 0.1, damping);
+    for (const PackedVectors& f : {forces(s.field, s.x), damping}) {
+      if (f.norm() == 0) continue;
+      const Eigen::Matrix3Xd f3 = f.topRows<3>(), x3 = s.x.topRows<3>();
+      Vector3 moment = Vector3::Zero();
+      Real scale = 0;
+      for (Eigen::Index i = 0; i < f3.cols(); ++i) {
+        moment += Vector3(x3.col(i)).cross(Vector3(f3.col(i)));
+        scale += x3.col(i).norm() * f3.col(i).norm();
+      }
+      force.see(f3.rowwise().sum().norm() / f3.colwise().norm().sum(), seed);
+      torque.see(moment.norm() / scale, seed);
+    }
+  }
+  const Real tolerance = kind().has_exact_stiffness ? 1e-12 : 1e-9;  // differences are no better
+  force.expect_below(tolerance, "net force");
+  torque.expect_below(tolerance, "net torque");
+}
+
+TEST_P(PotentialProperties, DampingTakesEnergyAndKeepsMomentum) {
+  WorstError linear, angular;
+  int damped = 0, taut = 0;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    PackedVectors f = PackedVectors::Zero(4, s.x.cols());
+    s.field.add_damping_forces(s.x, s.v, 0.1, f);
+    EXPECT_LE(f.cwiseProduct(s.v).sum(), 0) << trace(seed);
+    taut += !s.is_slack;
+    if (s.is_slack) {
+      PackedVectors v = s.v;
+      s.field.dissipate(s.x, s.inverse_masses, 0.1, 0.02, v);
+      EXPECT_EQ(f.norm() + (v - s.v).norm(), 0) << trace(seed) << ": slack, and yet damped";
+      continue;
+    }
+    for (const Real time : {1e-6, 1e-2, 1e6}) {
+      PackedVectors v = s.v;
+      s.field.dissipate(s.x, s.inverse_masses, time, 0.02, v);
+      Vector3 dp = Vector3::Zero(), dl = Vector3::Zero();
+      Real before = 0, after = 0, momentum = 0, moment = 0;
+      for (int i = 0; i < s.x.cols(); ++i) {
+        const Real m = 1 / s.inverse_masses[i];
+        const Vector3 x = s.x.col(i).head<3>(), dv = (v - s.v).col(i).head<3>();
+        dp += m * dv;
+        dl += m * x.cross(dv);
+        before += m * s.v.col(i).squaredNorm();
+        after += m * v.col(i).squaredNorm();
+        momentum += m * s.v.col(i).norm();
+        moment += m * x.norm() * s.v.col(i).norm();
+      }
+      damped += after < before * (1 - 1e-9);
+      EXPECT_LE(after, before * (1 + 1e-14)) << trace(seed) << ", time " << time;
+      if (!kind().conserves_momentum) continue;
+      linear.see(dp.norm() / momentum, seed);
+      angular.see(dl.norm() / moment, seed);
+    }
+  }
+  EXPECT_GT(taut, static_cast<int>(num_states) / 20);
+  EXPECT_GT(damped, taut);
+  if (!kind().conserves_momentum) return;
+  const Real tolerance = kind().has_exact_stiffness ? 1e-12 : 1e-9;
+  linear.expect_below(tolerance, "linear momentum");
+  angular.expect_below(tolerance, "angular momentum");
+}
+
+TEST_P(PotentialProperties, DampingMatrixTimesVelocityIsMinusTheDampingForce) {
+  WorstError error;
+  int damped = 0;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    PackedVectors f = PackedVectors::Zero(4, s.x.cols());
+    s.field.add_damping_forces(s.x, s.v, 0.1, f);
+    std::vector<std::pair<int, int>> pattern;
+    s.field.append_pattern(pattern);
+    LinearSystem damping{BlockMatrix(static_cast<int>(s.x.cols()), std::move(pattern)), {}, {}};
+    s.field.add_damping(s.x, 0.1, damping.matrix);
+    s.field.append_damping_terms(s.x, 0.1, damping.terms);
+    PackedVectors product(4, s.x.cols());
+    damping.multiply(s.v, product);
+    if (f.norm() > 0) {
+      Real size = damping.matrix.to_dense().norm();
+      for (const RankOneTerm& term : damping.terms) size += std::abs(term.coefficient) * term.direction.squaredNorm();
+      error.see((product + f).norm() / (size * s.v.norm()), seed);
+      ++damped;
+    } else {
+      EXPECT_EQ(product.norm(), 0) << trace(seed);
+    }
+  }
+  EXPECT_GT(damped, static_cast<int>(num_states) / 20);
+  error.expect_below(kind().has_exact_stiffness ? 1e-12 : 1e-9, "damping matrix");
+}
+
+TEST_P(PotentialProperties, EveryAccountOfTheEnergyIsTheSame) {
+  WorstError error;
+  for (unsigned seed = 0; seed < num_states; ++seed) {
+    const State s = state(seed);
+    const Real energy = s.field.energy(s.x);
+    std::vector<Real> energies, strains;
+    std::vector<LedgerEntry> ledger;
+    s.field.append_energies(s.x, energies);
+    s.field.append_strains(s.x, strains);
+    s.field.append_ledger(s.x, ledger);
+    ASSERT_EQ(energies.size(), 1u);
+    ASSERT_EQ(ledger.size(), 1u);
+    PackedVectors f = PackedVectors::Zero(4, s.x.cols());
+    for (const Real other : {s.field.add_forces(s.x, f), energies[0], ledger[0].energy,
+                             s.batch->stiffness(0) / 2 * strains[0] * strains[0]})
+      error.see(std::abs(other - energy) / (energy > 0 ? energy : 1), seed);
+    EXPECT_EQ(ledger[0].largest_strain, std::abs(strains[0]));
+    EXPECT_EQ(ledger[0].num_enabled, 1u);
+  }
+  error.expect_below(1e-12, "energy");
+}
+
+TEST_P(PotentialProperties, SwitchedOffNothingIsLeft) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    State s = state(seed);
+    s.batch->set_enabled(0, false);
+    PackedVectors f = PackedVectors::Zero(4, s.x.cols()), df = f, v = s.v;
+    EXPECT_EQ(s.field.add_forces(s.x, f), 0);
+    s.field.add_damping_forces(s.x, s.v, 1, f);
+    s.field.add_stiffness_product(s.x, StiffnessModel::taut, s.dx, 1, df);
+    s.field.dissipate(s.x, s.inverse_masses, 1, 1, v);
+    EXPECT_EQ(f.norm() + df.norm() + (v - s.v).norm(), 0);
+    EXPECT_EQ(stiffness(s.field, s.x, StiffnessModel::taut).norm(), 0);
+    std::vector<LedgerEntry> ledger;
+    s.field.append_ledger(s.x, ledger);
+    EXPECT_EQ(ledger[0].num_enabled, 0u);
+    EXPECT_EQ(ledger[0].energy, 0);
+    s.batch->set_enabled(0, true);
+    if (!s.is_slack) {
+      EXPECT_GT(forces(s.field, s.x).norm(), 0);
+    }
+  }
+}
+
+TEST_P(PotentialProperties, DegeneratePositionsGiveFiniteResults) {
+  const State s = state(1);
+  const Eigen::Index n = s.x.cols();
+  std::vector<Eigen::Matrix3Xd> cases;
+  cases.push_back(Eigen::Matrix3Xd::Zero(3, n));
+  cases.push_back(Eigen::Matrix3Xd::Constant(3, n, 1.5));
+  for (const int kept : {1, 2}) {
+    Eigen::Matrix3Xd flat = s.x.topRows<3>();
+    flat.bottomRows(3 - kept).setZero();
+    cases.push_back(flat);
+  }
+  for (const Eigen::Matrix3Xd& points : cases) {
+    const PackedVectors x = pack(points);
+    PackedVectors v = s.v;
+    EXPECT_TRUE(std::isfinite(s.field.energy(x)));
+    EXPECT_TRUE(forces(s.field, x).allFinite());
+    s.field.dissipate(x, s.inverse_masses, 0.1, 0.02, v);
+    EXPECT_TRUE(v.allFinite());
+    for (const StiffnessModel model :
+         {StiffnessModel::gauss_newton, StiffnessModel::exact, StiffnessModel::psd_projected, StiffnessModel::taut})
+      EXPECT_TRUE(stiffness(s.field, x, model).allFinite());
+  }
+}
+
+const auto name_of = [](const auto& tested) { return case_name(tested.param); };
+INSTANTIATE_TEST_SUITE_P(All, PotentialProperties, ::testing::ValuesIn(cases()), name_of);
+INSTANTIATE_TEST_SUITE_P(All, ExactStiffness, ::testing::ValuesIn(cases_where(&KindCase::has_exact_stiffness)), name_of);
+INSTANTIATE_TEST_SUITE_P(All, InternalForces, ::testing::ValuesIn(cases_where(&KindCase::conserves_momentum)), name_of);
+
+}  // namespace
+}  // namespace penalty::testing

@@ -1,0 +1,319 @@
+#include "penalty/stepping/contact.h"
+
+#include <numbers>
+
+#include "stepping/islands.h"
+
+namespace penalty::testing {
+namespace {
+
+constexpr Real gravity = 10;  // [m/s²], along -y
+
+// A particle on or above the plane through the origin whose normal is turned by `angle` from +y towards +x.
+struct OnPlane {
+  Body body;
+  RigidBody plane;
+  Vector3 normal, downhill;
+
+  explicit OnPlane(Real mass, Real angle = 0, Real friction = 0)
+      : body(make_free_particles(Eigen::Matrix3Xd::Zero(3, 1), {mass})),
+        normal(std::sin(angle), std::cos(angle), 0),
+        downhill(std::cos(angle), -std::sin(angle), 0) {
+    body.body.gravity = Vector3(0, -gravity, 0);
+    body.body.options.substeps = 7;
+    body.body.contacts.push_back({ContactPoint::at_particle(0), 0, {0, 0, 0}, normal, friction});
+  }
+  void step(Real duration) { advance(body, duration, std::span(&plane, 1)); }
+  Vector3 x() const { return body.position(0); }
+};
+
+TEST(Contact, AFallingParticleStopsAtThePlaneAndNeverPassesIt) {
+  OnPlane p(3);
+  p.body.set_position(0, {0, 1, 0});
+  Real lowest = 1;
+  for (int step = 0; step < 120; ++step) {
+    p.step(1.0 / 60);
+    lowest = std::min(lowest, p.x().y());
+    ASSERT_LE(p.body.body.report.contact_depth, 1e-15);
+    ASSERT_EQ(p.body.body.report.retries, 0) << "step " << step;
+    if (step == 25) {  // 26/60 s < sqrt(2/10) s: still a free fall
+      EXPECT_NEAR(p.x().y(), 1 - 5 * std::pow(26.0 / 60, 2), 1e-14);
+    }
+  }
+  EXPECT_GE(lowest, -1e-15);
+  EXPECT_NEAR(p.x().y(), 0, 1e-15);
+  EXPECT_EQ(p.x().x(), 0);
+  EXPECT_LE(std::abs(p.body.velocity(0).y()), gravity / 60 / 7 / 2 * (1 + 1e-12));  // the last half kick
+  EXPECT_EQ(p.body.body.report.num_contacts, 1);
+  EXPECT_EQ(p.plane.position, Vector3(0, 0, 0));
+}
+
+TEST(Contact, IsOneSided) {
+  OnPlane p(1);
+  p.body.body.gravity.setZero();
+  p.body.set_velocity(0, {1, 2, 3});
+  p.step(0.5);
+  EXPECT_LT((p.x() - Vector3(0.5, 1, 1.5)).norm(), 1e-15);
+  EXPECT_EQ(p.body.velocity(0), Vector3(1, 2, 3));
+}
+
+TEST(Contact, WithoutFrictionKeepsTheTangentialSpeed) {
+  OnPlane p(0.7);
+  p.body.set_velocity(0, {4, -3, -2});
+  for (int step = 0; step < 64; ++step) p.step(1.0 / 64);
+  EXPECT_EQ(p.body.velocity(0).x(), 4);
+  EXPECT_EQ(p.body.velocity(0).z(), -2);
+  EXPECT_LT((p.x() - Vector3(4, 0, -2)).norm(), 1e-12);
+}
+
+TEST(Contact, OnAnInclineSlipsWithTheCoulombAcceleration) {
+  // g (sin a - mu cos a) t²/2 downhill; the kicks before a drift add up to the midpoint speed, so it is exact.
+  const Real angle = std::numbers::pi / 6;
+  for (const Real friction : {0.0, 0.2, 0.5}) {
+    SCOPED_TRACE("friction " + std::to_string(friction));
+    ASSERT_LT(friction, std::tan(angle));
+    OnPlane p(2, angle, friction);
+    for (int step = 1; step <= 90; ++step) {
+      p.step(1.0 / 60);
+      const Real t = step / 60.0;
+      const Real expected = gravity * (std::sin(angle) - friction * std::cos(angle)) * t * t / 2;
+      ASSERT_LT((p.x() - expected * p.downhill).norm(), 1e-12) << "step " << step;
+    }
+  }
+}
+
+TEST(Contact, OnAnInclineSticksBelowTheAngleOfFriction) {
+  const Real angle = std::numbers::pi / 6;
+  OnPlane p(2, angle, std::tan(angle) * 1.001);
+  for (int step = 0; step < 120; ++step) p.step(1.0 / 60);
+  EXPECT_LT(p.x().norm(), 1e-13);
+}
+
+TEST(Contact, FrictionStopsASlideAfterVSquaredOverTwoMuG) {
+  OnPlane p(5, 0, 0.4);
+  p.body.set_velocity(0, {2, 0, 1});  // lying: the first normal impulse is that of half a kick
+  for (int step = 0; step < 120; ++step) p.step(1.0 / 60);
+  const Vector3 way = p.x();
+  // The slide ends within a substep h, an error of the order of the last bit of way, mu g h².
+  EXPECT_NEAR(way.norm(), 5 / (2 * 0.4 * gravity), 0.4 * gravity * std::pow(1.0 / 420, 2));
+  EXPECT_LT(way.cross(Vector3(2, 0, 1)).norm(), 1e-14);  // along the velocity
+  EXPECT_LT(p.body.velocity(0).cwiseProduct(Vector3(1, 0, 1)).norm(), 1e-14);
+}
+
+TEST(Contact, AConveyorCarriesAParticleUpToItsSpeed) {
+  OnPlane p(1, 0, 0.5);
+  p.plane.velocity = Vector3(3, 0, 0);
+  int retries = 0;
+  for (int step = 0; step < 120; ++step) {
+    p.step(1.0 / 60);
+    retries += p.body.body.report.retries;
+  }
+  // 0.6 s of mu g = 5 m/s², then 1.4 s at 3 m/s.
+  EXPECT_NEAR(p.body.velocity(0).x(), 3, 1e-14);
+  EXPECT_NEAR(p.x().x(), 0.9 + 1.4 * 3, 5 * std::pow(1.0 / 420, 2));
+  EXPECT_EQ(retries, 0);
+}
+
+TEST(Contact, DeepPenetrationIsTakenBackByPositionAndAddsNoEnergy) {
+  // One per cent of what is beyond the slop per sweep, for a particle and for a point between particles alike.
+  Eigen::Matrix3Xd positions(3, 3);
+  positions << 0, 1, 0, -0.2, -0.2, -0.2, 0, 0, 1;
+  Body body = make_free_particles(positions, {1, 2, 5});
+  body.body.options.substeps = 10;
+  const ContactPoint centre{{0, 1, 2}, {0.2, 0.3, 0.5}, 3};
+  body.body.contacts = {{centre, 0, {0, 0, 0}, {0, 1, 0}}};
+  RigidBody plane;
+  for (int step = 0; step < 20; ++step) advance(body, 1.0 / 60, std::span(&plane, 1));
+  const Real slop = body.body.options.contact_slop;
+  const Real height = 0.2 * body.position(0).y() + 0.3 * body.position(1).y() + 0.5 * body.position(2).y();
+  EXPECT_NEAR(height, -slop - (0.2 - slop) * std::pow(0.99, 200), 1e-12);
+  EXPECT_EQ(kinetic_energy(body.particles()), 0);
+}
+
+TEST(Contact, APinnedPointIsLeftAlone) {
+  OnPlane p(1);
+  p.body.particles().inverse_masses[0] = 0;
+  p.body.set_position(0, {0, -1, 0});
+  p.step(1);
+  EXPECT_EQ(p.x(), Vector3(0, -1, 0));
+}
+
+TEST(Contact, ACentralHitOnAFreeBodyIsPerfectlyPlastic) {
+  Body particle = make_free_particles(Eigen::Matrix3Xd(Vector3(-2, 0, 0)), {1});
+  particle.set_velocity(0, {3, 0, 0});
+  particle.body.options.substeps = 8;
+  RigidBody sphere = make_sphere(2, 1, {0, 0, 0});
+  particle.body.contacts = {{ContactPoint::at_particle(0), 0, {-1, 0, 0}, {-1, 0, 0}}};
+  for (int step = 0; step < 30; ++step) advance(particle, 1.0 / 60, std::span(&sphere, 1));
+  // 1 kg at 3 m/s and 2 kg at rest: 1 m/s together. The particle touches after 1/3 s.
+  EXPECT_LT((particle.velocity(0) - Vector3(1, 0, 0)).norm(), 1e-14);
+  EXPECT_LT((sphere.velocity - Vector3(1, 0, 0)).norm(), 1e-14);
+  EXPECT_LT((sphere.impulse - Vector3(2, 0, 0)).norm(), 1e-14);
+  EXPECT_TRUE(sphere.angular_velocity.isZero(0));
+  EXPECT_NEAR(particle.position(0).x(), sphere.position.x() - 1, 1e-14);
+}
+
+// Hits of one contact point, off the centre, with friction, on a flying and spinning sphere.
+void expect_momentum_kept(const std::string& what, const Eigen::Matrix3Xd& offsets, const std::vector<Real>& masses,
+                          const ContactPoint& point) {
+  SCOPED_TRACE(what);
+  WorstError linear, angular;
+  int hits = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    Random random(seed);
+    RigidBody sphere = make_sphere(random.uniform(0.1, 10), 0.8, random.vector(3));
+    sphere.rotation = random.rotation();
+    sphere.velocity = random.vector(1);
+    sphere.angular_velocity = random.vector(5);
+    const Vector3 normal = random.direction();
+    Vector3 middle = Vector3::Zero();
+    for (int k = 0; k < point.num_particles; ++k) middle += point.weights[k] * offsets.col(point.particles[k]);
+    const Vector3 touch = sphere.position + 0.8 * (normal + 0.3 * random.vector(1)).normalized();
+    const Vector3 shift = touch + 0.05 * normal - middle;
+    const Eigen::Matrix3Xd start = offsets.colwise() + shift;
+    Body body = make_free_particles(start, masses);
+    body.body.options.substeps = 10;
+    for (int i = 0; i < body.particles().size(); ++i) body.set_velocity(i, random.vector(1) - 8 * normal);
+    body.body.contacts = {{point, 0, sphere.rotation.transpose() * (touch - sphere.position),
+                           sphere.rotation.transpose() * normal, random.uniform(0, 1)}};
+    const Momentum before = momentum({&body}, std::span(&sphere, 1));
+    const Real energy = kinetic_energy(body.particles());
+    for (int step = 0; step < 3; ++step) {
+      advance(body, 1.0 / 60, std::span(&sphere, 1));
+      ASSERT_EQ(body.body.report.retries, 0) << "seed " << seed;
+    }
+    hits += sphere.impulse.norm() > 0.1;
+    EXPECT_NE(kinetic_energy(body.particles()), energy);
+    const Momentum after = momentum({&body}, std::span(&sphere, 1));
+    const Real scale = before.linear.norm() + sphere.impulse.norm();
+    linear.see((after.linear - before.linear).norm() / scale, seed);
+    angular.see((after.angular - before.angular).norm() / (before.angular.norm() + scale * sphere.position.norm()),
+                seed);
+  }
+  EXPECT_GT(hits, 30);
+  linear.expect_below(1e-14, "linear momentum of " + what);
+  angular.expect_below(1e-14, "angular momentum of " + what);
+}
+
+TEST(Contact, AParticleAndAFreeBodyKeepBothMomenta) {
+  expect_momentum_kept("a particle", Eigen::Matrix3Xd::Zero(3, 1), {0.7}, ContactPoint::at_particle(0));
+}
+
+TEST(Contact, APointBetweenParticlesAndAFreeBodyKeepBothMomenta) {
+  Eigen::Matrix3Xd triangle(3, 4);
+  triangle << 0, 1, 0, 5, 0, 0, 1, 5, 0.1, 0, 0, 5;
+  expect_momentum_kept("a point of a face", triangle, {0.7, 1.5, 0.2, 1}, {{0, 1, 2}, {0.2, 0.5, 0.3}, 3});
+}
+
+TEST(Contact, OfAnElasticBodyWithAFreeBodyKeepsBothMomentaAndGainsNoEnergy) {
+  Body beam = make_beam_body(1);
+  RigidBody sphere = make_sphere(500, 0.5, {2, -0.6, 0.5});
+  sphere.velocity = Vector3(0, 4, 0);
+  sphere.angular_velocity = Vector3(1, 2, 6);
+  for (int i = 0; i < beam.particles().size(); ++i)
+    if (std::abs(beam.position(i).x() - 2) < 1.1 && beam.position(i).y() < 0.1)
+      beam.body.contacts.push_back({ContactPoint::at_particle(i), 0, {0, 0.5, 0}, {0, 1, 0}, 0.3});
+  ASSERT_GE(beam.body.contacts.size(), 3u);
+  const Momentum before = momentum({&beam}, std::span(&sphere, 1));
+  const Real energy = 0.5 * 500 * 16 + 0.5 * 0.4 * 500 * 0.25 * 41;
+  for (int step = 0; step < 30; ++step) advance(beam, 1.0 / 60, std::span(&sphere, 1));
+  EXPECT_GT(sphere.impulse.norm(), 100);
+  const Momentum after = momentum({&beam}, std::span(&sphere, 1));
+  EXPECT_LT((after.linear - before.linear).norm(), 1e-13 * before.linear.norm());
+  EXPECT_LT((after.angular - before.angular).norm(), 1e-13 * before.angular.norm());
+  const Real left = beam.energy() + 0.5 * 500 * sphere.velocity.squaredNorm() +
+                    0.5 * 0.4 * 500 * 0.25 * sphere.angular_velocity.squaredNorm();
+  EXPECT_LT(left, 1.005 * energy);
+  EXPECT_GT(left, 0.2 * energy);
+}
+
+TEST(Contact, OfTwoBodiesWithOneRigidBodyKeepsMomenta) {
+  // A sphere between two beams that close in on it.
+  Body below = make_beam_body(1), above = make_beam_body(1);
+  for (int i = 0; i < above.particles().size(); ++i) {
+    above.set_position(i, above.position(i) + Vector3(0.3, 2.2, 0.1));
+    above.set_velocity(i, {0, -3, 0.2});
+    below.set_velocity(i, {0.1, 2, 0});
+  }
+  RigidBody sphere = make_sphere(800, 0.5, {2, 1.6, 0.5});
+  sphere.angular_velocity = Vector3(0, 1, 4);
+  for (int i = 0; i < below.particles().size(); ++i) {
+    if (std::abs(below.position(i).x() - 2) < 1.1 && below.position(i).y() > 0.9)
+      below.body.contacts.push_back({ContactPoint::at_particle(i), 0, {0, -0.5, 0}, {0, -1, 0}, 0.4});
+    if (std::abs(above.position(i).x() - 2) < 1.1 && above.position(i).y() < 2.3)
+      above.body.contacts.push_back({ContactPoint::at_particle(i), 0, {0, 0.5, 0}, {0, 1, 0}, 0.4});
+  }
+  ASSERT_GE(below.body.contacts.size(), 3u);
+  ASSERT_GE(above.body.contacts.size(), 3u);
+  const auto island = [&] { return momentum({&below, &above}, std::span(&sphere, 1)); };
+  const Momentum before = island();
+  SteppedBody* bodies[] = {&below.body, &above.body};
+  for (int step = 0; step < 30; ++step) {
+    penalty::advance(bodies, std::span(&sphere, 1), 1.0 / 60);
+    ASSERT_TRUE(below.body.report.finite && above.body.report.finite);
+  }
+  EXPECT_GT(below.body.report.elastic_energy, 1);
+  EXPECT_GT(above.body.report.elastic_energy, 1);
+  Real scale = 0;
+  for (const Body* body : {&below, &above})
+    for (int i = 0; i < body->particles().size(); ++i)
+      scale += body->velocity(i).norm() / body->particles().inverse_masses[i];
+  EXPECT_LT((island().linear - before.linear).norm(), 1e-13 * scale);
+  EXPECT_LT((island().angular - before.angular).norm(), 1e-13 * scale * 4);
+}
+
+TEST(Contact, AMovingPlanePushesABodyWithoutEndlessRepeats) {
+  Body beam = make_beam_body(1);
+  RigidBody plane;
+  plane.position = Vector3(0, -0.05, 0);
+  plane.velocity = Vector3(0, 1.5, 0);
+  for (int i = 0; i < beam.particles().size(); ++i)
+    beam.body.contacts.push_back({ContactPoint::at_particle(i), 0, {0, 0, 0}, {0, 1, 0}, 0.2});
+  int retries = 0, most_retries = 0;
+  Real depth = 0;
+  for (int step = 0; step < 120; ++step) {
+    advance(beam, 1.0 / 60, std::span(&plane, 1));
+    ASSERT_TRUE(beam.body.report.finite);
+    retries += beam.body.report.retries;
+    most_retries = std::max(most_retries, beam.body.report.retries);
+    depth = std::max(depth, beam.body.report.contact_depth);
+  }
+  RecordProperty("retries", retries);
+  EXPECT_NEAR(plane.position.y(), 2.95, 1e-12);
+  EXPECT_TRUE(plane.impulse.isZero(0));  // it takes none
+  EXPECT_GE(beam.particles().positions.row(1).minCoeff(), plane.position.y() - 1e-13);
+  EXPECT_LT(depth, 1e-13);
+  EXPECT_GT(linear_momentum(beam.particles()).y(), 4000 * 1.4);
+  EXPECT_LE(most_retries, 2);
+  EXPECT_LE(retries, 6);
+}
+
+TEST(Contact, ABodyDroppedOnThePlaneGainsNoEnergyAndNeverPassesIt) {
+  Body beam = make_beam_body(1);
+  beam.particles().positions.row(1).array() += 0.5;
+  beam.body.gravity = Vector3(0, -gravity, 0);
+  RigidBody plane;
+  for (int i = 0; i < beam.particles().size(); ++i)
+    beam.body.contacts.push_back({ContactPoint::at_particle(i), 0, {0, 0, 0}, {0, 1, 0}});
+  const auto total = [&] {
+    Real potential = 0;
+    for (int i = 0; i < beam.particles().size(); ++i)
+      potential += gravity * beam.position(i).y() / beam.particles().inverse_masses[i];
+    return beam.energy() + potential;
+  };
+  advance(beam, 1e-6, std::span(&plane, 1));
+  const Real start = total();
+  Real last = start;
+  for (int step = 0; step < 240; ++step) {
+    advance(beam, 1.0 / 60, std::span(&plane, 1));
+    ASSERT_GE(beam.particles().positions.row(1).minCoeff(), -1e-13);
+    ASSERT_LT(total(), last + 0.01 * start) << "step " << step;
+    last = total();
+  }
+  EXPECT_LT(last, 1.01 * start);
+  const Vector3 p = linear_momentum(beam.particles());
+  EXPECT_LT(std::hypot(p.x(), p.z()), 1e-9);
+}
+
+}  // namespace
+}  // namespace penalty::testing

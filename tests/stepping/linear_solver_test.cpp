@@ -1,0 +1,158 @@
+#include "penalty/stepping/linear_solver.h"
+
+#include <Eigen/Cholesky>
+
+#include "stepping/islands.h"
+
+namespace penalty::testing {
+namespace {
+
+// The stiffness of a deformed body, some inertia, and whatever is asked for besides.
+struct Problem {
+  PackedVectors x, b;
+  LinearSystem system;
+
+  explicit Problem(unsigned seed, const std::array<int, 3>& cells = {3, 2, 2}, Real inertia = 1e-3)
+      : system{BlockMatrix(0, {}), {}, {}} {
+    Random random(seed);
+    const TetMesh mesh = noisy_box(cells, 0.5, 0.1, random);
+    const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 100});
+    x = deformed(field.rest_positions(), 0.02, random);
+    b = random_packed(x.cols(), 1, random);
+    system.matrix = assembled(field, x, StiffnessModel::psd_projected);
+    for (int i = 0; i < x.cols(); ++i) system.matrix.add_to_diagonal(i, inertia * random.uniform(1, 2));
+  }
+
+  void add_term(unsigned seed, Real coefficient) {
+    Random random(seed);
+    RankOneTerm term{coefficient, {}, random.vectors<Eigen::Dynamic>(x.cols(), 1)};
+    for (int i = 0; i < x.cols(); ++i) term.particles.push_back(i);
+    system.terms.push_back(std::move(term));
+  }
+
+  Eigen::MatrixXd dense() const {
+    Eigen::MatrixXd a = system.matrix.to_dense();
+    for (const RankOneTerm& term : system.terms) {
+      Eigen::VectorXd d = Eigen::VectorXd::Zero(a.rows());
+      for (std::size_t k = 0; k < term.particles.size(); ++k)
+        d.segment<3>(3 * term.particles[k]) = term.direction.col(static_cast<Eigen::Index>(k));
+      a += term.coefficient * d * d.transpose();
+    }
+    for (const int i : system.fixed) {
+      a.middleRows<3>(3 * i).setZero();
+      a.middleCols<3>(3 * i).setZero();
+      a.block<3, 3>(3 * i, 3 * i).setIdentity();
+    }
+    return a;
+  }
+
+  PackedVectors exact() const {
+    PackedVectors right = b;
+    system.clear_fixed(right);
+    const Eigen::VectorXd solution = dense().ldlt().solve(Eigen::VectorXd(right.topRows<3>().reshaped()));
+    return pack(solution.reshaped(3, x.cols()));
+  }
+
+  PackedVectors solved(int* iterations = nullptr, const LinearOptions& options = {2000, 1e-12}) const {
+    LinearSolver solver;
+    solver.set_pattern(system.matrix);
+    solver.factorize(system, x);
+    PackedVectors y(4, x.cols());
+    const int used = solver.solve(system, b, options, y).iterations;
+    if (iterations) *iterations = used;
+    return y;
+  }
+};
+
+TEST(LinearSolver, SolvesWhatADenseFactorisationSolves) {
+  WorstError plain, fixed, terms;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    Problem problem(seed);
+    plain.see(relative_error(problem.solved(), problem.exact()), seed);
+    problem.system.fixed = {0, 5, 17};
+    const PackedVectors y = problem.solved();
+    fixed.see(relative_error(y, problem.exact()), seed);
+    for (const int i : problem.system.fixed) EXPECT_TRUE(y.col(i).isZero(0));
+    problem.add_term(seed, 1e4);
+    problem.add_term(seed + 100, 3);
+    terms.see(relative_error(problem.solved(), problem.exact()), seed);
+  }
+  plain.expect_below(1e-8, "free");
+  fixed.expect_below(1e-8, "some fixed");
+  terms.expect_below(1e-8, "dense terms");
+}
+
+TEST(LinearSolver, LeadsDownhillHoweverEarlyItStops) {
+  const Problem problem(3);
+  for (int most = 1; most < 12; ++most) {
+    int iterations = 0;
+    const PackedVectors y = problem.solved(&iterations, {most, 1e-12});
+    EXPECT_EQ(iterations, most);
+    EXPECT_GT(y.cwiseProduct(problem.b).sum(), 0);
+  }
+}
+
+TEST(LinearSolver, CoarseSpaceKeepsTheIterationsOfALongBarFew) {
+  // A bar four, then sixteen times as long as wide, nearly without inertia: block Jacobi alone needs more iterations the longer
+  // it is. Groups of 40 that move as rigid bodies carry the smooth part.
+  const auto without_coarse_space = [](const Problem& problem) {
+    // The same recurrence with the block diagonal alone.
+    const LinearSystem& a = problem.system;
+    PackedVectors r = problem.b, z = r, q(4, r.cols());
+    const auto precondition = [&] {
+      for (int i = 0; i < r.cols(); ++i)
+        z.col(i).head<3>() = a.matrix.diagonal(i).ldlt().solve(Vector3(r.col(i).head<3>()));
+    };
+    precondition();
+    PackedVectors p = z;
+    Real rz = r.cwiseProduct(z).sum();
+    const Real enough = 1e-12 * rz;
+    int iterations = 0;
+    for (; rz > enough && iterations < 5000; ++iterations) {
+      a.multiply(p, q);
+      const Real length = rz / p.cwiseProduct(q).sum();
+      r -= length * q;
+      precondition();
+      const Real next = r.cwiseProduct(z).sum();
+      p = z + next / rz * p;
+      rz = next;
+    }
+    return iterations;
+  };
+  int with = 0;
+  const Problem bar(1, {32, 2, 2}, 1e-7);
+  bar.solved(&with, {5000, 1e-6});
+  const int without = without_coarse_space(bar);
+  RecordProperty("with", with);
+  RecordProperty("without", without);
+  EXPECT_LT(3 * with, without);
+}
+
+TEST(LinearSolver, HasNothingToDoForZero) {
+  Problem problem(1);
+  problem.b.setZero();
+  int iterations = -1;
+  EXPECT_TRUE(problem.solved(&iterations).isZero(0));
+  EXPECT_EQ(iterations, 0);
+}
+
+TEST(LinearSolver, EveryParticleMayBeFixed) {
+  Problem problem(1);
+  for (int i = 0; i < problem.x.cols(); ++i) problem.system.fixed.push_back(i);
+  EXPECT_TRUE(problem.solved().isZero(0));
+}
+
+TEST(LinearSolver, ParticlesInOnePlaceAreNoObstacle) {
+  Problem problem(2);
+  const PackedVectors expected = problem.exact();
+  problem.x.setConstant(0.25);  // the groups have no size then, and cannot turn
+  EXPECT_LT(relative_error(problem.solved(), expected), 1e-8);
+}
+
+TEST(LinearSolver, GivesTheSameBitsTwice) {
+  const Problem problem(4);
+  EXPECT_EQ(problem.solved(nullptr, {25, 1e-3}), problem.solved(nullptr, {25, 1e-3}));
+}
+
+}  // namespace
+}  // namespace penalty::testing
