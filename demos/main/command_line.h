@@ -27,7 +27,7 @@ struct RunOptions {
   render::Backend backend = render::Backend::automatic;
   bool render = true;
   std::optional<Coloring> coloring;  // empty: as the scene looks best
-  std::optional<Real> still;  // [s]
+  std::optional<Real> still;         // [s]
 };
 
 struct CommandLine {

@@ -63,11 +63,10 @@ class Stage {
                         setup_.body.is_shell() ? std::to_string(triangles_.size()) + " triangles"
                                                : std::to_string(setup_.body.solid().tetrahedra.size()) + " tetrahedra",
                         std::string(name_of(options_.world)) + " world, " + std::string(bullet_precision())};
-    overlay.color_bar = shows_energy_
-                            ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() +
-                                                   (setup_.body.is_shell() ? "/m²]" : "/m³]"),
-                                               unit()}
-                            : render::ColorBar{"mean |C|\nof lengths", 1};
+    overlay.color_bar = shows_energy_ ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() +
+                                                             (setup_.body.is_shell() ? "/m²]" : "/m³]"),
+                                                         unit()}
+                                      : render::ColorBar{"mean |C|\nof lengths", 1};
     overlay.inset = curves(record.time);
     return overlay;
   }

@@ -16,7 +16,7 @@ struct StepRecord {
   ShapeErrors errors;
   Real penetration = 0;    // below the true rigid surfaces [m]
   Real contact_depth = 0;  // below the planes of contact, which lie a margin outside [m]
-  bool implicit = false;  // the step was
+  bool implicit = false;   // the step was
   int substeps = 0, retries = 0, newton_iterations = 0;
   Real milliseconds = 0;             // CPU time of the world step
   std::optional<Real> tip_drop;      // [m]

@@ -49,7 +49,8 @@ Json ledger_summary(const std::vector<StepRecord>& steps) {
                        {"enabled", b.num_enabled},
                        {"energy", number(b.energy)},
                        {"strain", {{"mean", number(b.mean_strain)}, {"max", number(b.largest_strain)}}}});
-  for (const EnergyFlows::Part& flow : EnergyFlows::parts()) flows[std::string(flow.name)] = number(steps.back().flows.*flow.member);
+  for (const EnergyFlows::Part& flow : EnergyFlows::parts())
+    flows[std::string(flow.name)] = number(steps.back().flows.*flow.member);
   return {{"batches", batches}, {"flows", flows}, {"residual", number(ledger_residual(steps))}};
 }
 

@@ -70,7 +70,7 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
 
 }  // namespace
 
-const SceneEntry beam_scene{"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2,
-                            beam_body, beam};
+const SceneEntry beam_scene{"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2, beam_body,
+                            beam};
 
 }  // namespace penalty::demo

@@ -10,7 +10,8 @@ namespace {
 template <class Visit>
 void for_each_length_batch(const PotentialField& field, const Visit& visit) {
   for (const auto& potential : field.potentials()) {
-    if (const auto* nested = dynamic_cast<const PotentialField*>(potential.get())) for_each_length_batch(*nested, visit);
+    if (const auto* nested = dynamic_cast<const PotentialField*>(potential.get()))
+      for_each_length_batch(*nested, visit);
     if (const auto* batch = dynamic_cast<const Batch<Length>*>(potential.get())) visit(*batch);
   }
 }

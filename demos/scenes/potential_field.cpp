@@ -203,7 +203,11 @@ std::vector<Figure> potential_field(const SceneOptions& options) {
 
 }  // namespace
 
-const SceneEntry potential_field_scene{"potential_field", "a figure: equipotential surfaces of one particle, and the forces of a volume", 6,
-                                       nullptr, nullptr, potential_field};
+const SceneEntry potential_field_scene{"potential_field",
+                                       "a figure: equipotential surfaces of one particle, and the forces of a volume",
+                                       6,
+                                       nullptr,
+                                       nullptr,
+                                       potential_field};
 
 }  // namespace penalty::demo

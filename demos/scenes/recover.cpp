@@ -11,11 +11,11 @@ namespace penalty::demo {
 namespace {
 
 const Material jelly{.young = 1e6, .poisson = 0.35, .density = 1000};  // of two phases
-constexpr Real damping = 0.005; // ratio to stiffness [s]
-constexpr Real interval = 2;  // from one start to the next [s]
-constexpr Real recovered_below = 1e-2;  // rest error
+constexpr Real damping = 0.005;                                        // ratio to stiffness [s]
+constexpr Real interval = 2;                                           // from one start to the next [s]
+constexpr Real recovered_below = 1e-2;                                 // rest error
 
-constexpr Start sequence[] = {Start::scramble, Start::squash, Start::plane, Start::line,
+constexpr Start sequence[] = {Start::scramble, Start::squash, Start::plane,  Start::line,
                               Start::point,    Start::mirror, Start::jitter, Start::scramble};
 
 /// How many of the starts the body had come back from when the next one came.
@@ -38,20 +38,21 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
   if (body.is_shell()) throw std::invalid_argument("scene recover needs tetrahedra");
   Elasticity elastic = elasticity(options, body.solid(), jelly, ElasticModel::neo_hookean, 2);
   const Eigen::Matrix3Xd& rest = body.vertices();
-  SceneSetup setup{.name = "recover",
-                   .title = options.start ? "Recovery: " + std::string(name_of(*options.start)) : "Recovery",
-                   .body = body,
-                   .field = std::move(elastic.field),
-                   .mass = elastic.mass,
-                   .positions = start_positions(rest, options.start.value_or(sequence[0]), options.seed),
-                   .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-                   .pinned = {},
-                   .gravity = {0, 0, 0},
-                   .ground = false,
-                   .objects = {},
-                   .step = step_options(options, {.integrator = Integrator::implicit_step, .damping_time = damping}),
-                   .tip = {},
-                   .look = {.azimuth = 20, .elevation = 18, .still_time = 0.13, .strain = true, .color_high = 1, .reach = 0.85}};
+  SceneSetup setup{
+      .name = "recover",
+      .title = options.start ? "Recovery: " + std::string(name_of(*options.start)) : "Recovery",
+      .body = body,
+      .field = std::move(elastic.field),
+      .mass = elastic.mass,
+      .positions = start_positions(rest, options.start.value_or(sequence[0]), options.seed),
+      .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
+      .pinned = {},
+      .gravity = {0, 0, 0},
+      .ground = false,
+      .objects = {},
+      .step = step_options(options, {.integrator = Integrator::implicit_step, .damping_time = damping}),
+      .tip = {},
+      .look = {.azimuth = 20, .elevation = 18, .still_time = 0.13, .strain = true, .color_high = 1, .reach = 0.85}};
   if (options.start) return setup;
 
   std::uint32_t seed = options.seed;
@@ -72,7 +73,8 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
 
 }  // namespace
 
-const SceneEntry recover_scene{"recover", "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16,
+const SceneEntry recover_scene{"recover",
+                               "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16,
                                recover_body, recover};
 
 }  // namespace penalty::demo

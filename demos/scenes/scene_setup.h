@@ -16,12 +16,13 @@ namespace penalty::demo {
 
 /// From where it is drawn, and which moment makes the still.
 struct Look {
-  Real azimuth = 28, elevation = 14;  // [degrees]
-  Real still_time = -1;               // [s]; negative: the end
-  bool wire = true;                   // the edges of the triangles, but for an embedded surface
-  bool strain = false;                // colours show strain, unless the user says otherwise
+  Real azimuth = 28, elevation = 14;    // [degrees]
+  Real still_time = -1;                 // [s]; negative: the end
+  bool wire = true;                     // the edges of the triangles, but for an embedded surface
+  bool strain = false;                  // colours show strain, unless the user says otherwise
   std::optional<Real> color_high = {};  // top of the colours; empty: what most of the body reaches at some time
-  std::optional<Real> reach = {};       // the clip shows a ball about the rest shape, that many times as large; empty: all that moves
+  std::optional<Real> reach =
+      {};  // the clip shows a ball about the rest shape, that many times as large; empty: all that moves
 };
 
 /// The body is put somewhere else, at rest.
@@ -72,8 +73,8 @@ const std::vector<SceneEntry>& scenes();
 const SceneEntry& find_scene(std::string_view name);
 
 // One file each.
-extern const SceneEntry drop_scene, beam_scene, flight_scene, cloth_scene, balloon_scene, muscle_scene,
-    plastic_scene, tear_scene, user_constraint_scene, recover_scene, potential_field_scene;
+extern const SceneEntry drop_scene, beam_scene, flight_scene, cloth_scene, balloon_scene, muscle_scene, plastic_scene,
+    tear_scene, user_constraint_scene, recover_scene, potential_field_scene;
 
 /// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
 /// it.

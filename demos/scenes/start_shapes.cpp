@@ -51,7 +51,9 @@ std::string_view name_in(const Table& table, Value value) {
 WorldKind world_from_name(std::string_view name) { return look_up(worlds, "world", name); }
 Start start_from_name(std::string_view name) { return look_up(starts, "start", name); }
 ElasticModel model_from_name(std::string_view name) { return look_up(models, "model", name); }
-std::optional<Integrator> integrator_from_name(std::string_view name) { return look_up(integrators, "integrator", name); }
+std::optional<Integrator> integrator_from_name(std::string_view name) {
+  return look_up(integrators, "integrator", name);
+}
 std::string_view name_of(WorldKind world) { return name_in(worlds, world); }
 std::string_view name_of(Start start) { return name_in(starts, start); }
 

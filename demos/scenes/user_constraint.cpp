@@ -107,7 +107,8 @@ SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
 
 }  // namespace
 
-const SceneEntry user_constraint_scene{"user_constraint", "a bar winds itself up: its constraint is a twist, written in the scene", 5,
+const SceneEntry user_constraint_scene{"user_constraint",
+                                       "a bar winds itself up: its constraint is a twist, written in the scene", 5,
                                        user_constraint_body, user_constraint};
 
 }  // namespace penalty::demo

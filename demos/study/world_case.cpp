@@ -8,8 +8,8 @@ namespace penalty::study {
 namespace {
 
 constexpr std::string_view scene_name = "recover";  // one free body, of the material "recovering"
-constexpr Real rate = 60;                          // world steps a second
-constexpr Real early = 5;                          // when a longer run is looked at in between [s]
+constexpr Real rate = 60;                           // world steps a second
+constexpr Real early = 5;                           // when a longer run is looked at in between [s]
 
 }  // namespace
 

@@ -26,8 +26,9 @@ void add_forces(benchmark::State& state) {
 // All the elements of a material, a tetrahedron.
 void add_material_forces(benchmark::State& state) {
   const TetMesh mesh = make_beam(static_cast<int>(state.range(0)));
-  const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1e6, .poisson = 0.4},
-                                                  static_cast<ElasticModel>(state.range(1)));
+  const PotentialField field =
+      make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1e6, .poisson = 0.4},
+                         static_cast<ElasticModel>(state.range(1)));
   PackedVectors x = field.rest_positions(), f = PackedVectors::Zero(4, x.cols());
   x.topRows<3>() *= 1.01;
   for (auto _ : state) benchmark::DoNotOptimize(field.add_forces(x, f));

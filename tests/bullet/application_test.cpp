@@ -122,7 +122,8 @@ TEST_P(Application, APinnedBodyHangsOn) {
   for (int i = 0; i < beam.vertices.cols(); ++i)
     if (beam.vertices(0, i) < 1e-9) options.pinned.push_back(i);
   ASSERT_EQ(options.pinned.size(), 9u);
-  btSoftBody& body = sim.add_jelly(beam, {.stiffness = 20, .body = options, .attach = {.step = {.damping_time = 0.02}}});
+  btSoftBody& body =
+      sim.add_jelly(beam, {.stiffness = 20, .body = options, .attach = {.step = {.damping_time = 0.02}}});
   const PackedVectors start = sim.penalty().particles(body).positions;
   sim.step(1.0 / 60, 120);
   for (const int i : options.pinned) {
@@ -208,7 +209,8 @@ TEST_P(Application, ARigidBodyCanBeRemovedFromUnderASoftOne) {
   sim.set_gravity({0, -9.81, 0});
   sim.add_ground();
   btRigidBody& table = sim.add_box({0.5, 0.25, 0.5}, 3, {0, 0.25, 0});
-  btSoftBody& body = sim.add_jelly(make_ball(0.25, 2), {.shift = {0, 0.8, 0}, .attach = {.step = {.damping_time = 0.01}}});
+  btSoftBody& body =
+      sim.add_jelly(make_ball(0.25, 2), {.shift = {0, 0.8, 0}, .attach = {.step = {.damping_time = 0.01}}});
   sim.step(1.0 / 60, 60);
   ASSERT_GT(sim.penalty().report(body).num_contacts, 0);
   ASSERT_GT(lowest(body), 0.5);

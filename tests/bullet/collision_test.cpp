@@ -79,7 +79,9 @@ class RigidHit : public Collision {
 };
 
 TEST_P(RigidHit, LightBox) { hit(std::make_unique<btBoxShape>(btVector3(0.25, 0.25, 0.25)), 0.1, Matrix3::Identity()); }
-TEST_P(RigidHit, EquallyHeavyBox) { hit(std::make_unique<btBoxShape>(btVector3(0.25, 0.25, 0.25)), 1, Matrix3::Identity()); }
+TEST_P(RigidHit, EquallyHeavyBox) {
+  hit(std::make_unique<btBoxShape>(btVector3(0.25, 0.25, 0.25)), 1, Matrix3::Identity());
+}
 TEST_P(RigidHit, HeavyBox) { hit(std::make_unique<btBoxShape>(btVector3(0.25, 0.25, 0.25)), 10, Matrix3::Identity()); }
 TEST_P(RigidHit, LightSphere) { hit(std::make_unique<btSphereShape>(0.25), 0.1, Matrix3::Identity()); }
 TEST_P(RigidHit, EquallyHeavySphere) { hit(std::make_unique<btSphereShape>(0.25), 1, Matrix3::Identity()); }

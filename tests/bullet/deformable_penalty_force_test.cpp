@@ -88,7 +88,8 @@ TEST_P(StockDeformable, ExplicitModeIsSymplecticEuler) {
   }
   EXPECT_GT((x - start).norm(), 0.1);
   Real error = 0;
-  for (int i = 0; i < x.cols(); ++i) error = std::max(error, (to_vector(body.m_nodes[i].m_x) - x.col(i).head<3>()).norm());
+  for (int i = 0; i < x.cols(); ++i)
+    error = std::max(error, (to_vector(body.m_nodes[i].m_x) - x.col(i).head<3>()).norm());
   EXPECT_LT(error, limit(1e-11, 1e-4));
   sim.remove(body);
 }
@@ -126,7 +127,8 @@ TEST_P(StockDeformable, ImplicitModeLetsABeamSagAndComeToRest) {
   ours.set_gravity({0, -9.81, 0});
   SoftBodyOptions options;
   options.pinned = pinned;
-  btSoftBody& reference = ours.add_jelly(beam, {.stiffness = 100, .body = options, .attach = {.step = {.damping_time = 0.05, .drag = 2}}});
+  btSoftBody& reference =
+      ours.add_jelly(beam, {.stiffness = 100, .body = options, .attach = {.step = {.damping_time = 0.05, .drag = 2}}});
   ours.step(1.0 / 60, 300);
   EXPECT_NEAR(lowest(body), lowest(reference), 0.05 * std::abs(lowest(reference)));
   sim.remove(body);

@@ -14,7 +14,8 @@ struct Girth {
   static constexpr int num_points = 3;
   static Girth at_rest(const Points<3>& p) { return {1 / sum(p)}; }
   static Real sum(const Points<3>& p) {
-    return (p.col(1) - p.col(0)).squaredNorm() + (p.col(2) - p.col(1)).squaredNorm() + (p.col(0) - p.col(2)).squaredNorm();
+    return (p.col(1) - p.col(0)).squaredNorm() + (p.col(2) - p.col(1)).squaredNorm() +
+           (p.col(0) - p.col(2)).squaredNorm();
   }
   Real value(const Points<3>& p) const { return sum(p) * scale - 1; }
   Gradient<3> gradient(const Points<3>& p) const {
@@ -76,11 +77,13 @@ TEST_P(Editing, LedgerBalancesWhileABodyTears) {
   btSoftBody& body = sim.add(make_soft_body(sim.info(), mesh, {}));
   sim.penalty().attach(body, std::move(springs), {.step = {.safety = 0.2}});
   const Batch<Length>& batch = *sim.penalty().field(body).find<Length>();
-  for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_v = btVector3(60 * (body.m_nodes[i].m_x.x() - btScalar(0.5)), 0, 0);
+  for (int i = 0; i < body.m_nodes.size(); ++i)
+    body.m_nodes[i].m_v = btVector3(60 * (body.m_nodes[i].m_x.x() - btScalar(0.5)), 0, 0);
   sim.penalty().synchronize(body);
   Real start = -1, largest = 0, worst = 0;
   const auto energy = [&] {
-    return sim.penalty().field(body).energy(sim.penalty().particles(body).positions) + kinetic_energy(sim.penalty().particles(body));
+    return sim.penalty().field(body).energy(sim.penalty().particles(body).positions) +
+           kinetic_energy(sim.penalty().particles(body));
   };
   start = energy();
   for (int k = 0; k < 60; ++k) {
@@ -113,7 +116,8 @@ class Attachments : public WorldTest {
   static int nearest(const btSoftBody& body, const Vector3& place) {
     int best = 0;
     for (int i = 0; i < body.m_nodes.size(); ++i)
-      if ((to_vector(body.m_nodes[i].m_x) - place).norm() < (to_vector(body.m_nodes[best].m_x) - place).norm()) best = i;
+      if ((to_vector(body.m_nodes[i].m_x) - place).norm() < (to_vector(body.m_nodes[best].m_x) - place).norm())
+        best = i;
     return best;
   }
 };
@@ -138,7 +142,8 @@ TEST_P(Attachments, TieTwoSoftBodiesAndARigidOneAndKeepMomentum) {
     sim.step(frame);
     const Totals now = sim.totals();
     momentum_drift = std::max(momentum_drift, (now.momentum - before.momentum).norm() / before.momentum.norm());
-    angular_drift = std::max(angular_drift, (now.angular_momentum - before.angular_momentum).norm() / before.angular_momentum.norm());
+    angular_drift = std::max(angular_drift,
+                             (now.angular_momentum - before.angular_momentum).norm() / before.angular_momentum.norm());
     EXPECT_LE(now.energy + sim.penalty().coupling_energy(coupling), before.energy * 1.01);
   }
   EXPECT_LT(momentum_drift, limit(1e-12, 1e-5));
@@ -150,18 +155,21 @@ TEST_P(Attachments, ABodyHangsOnAKinematicHandThatMoves) {
   sim.set_gravity({0, -9.81, 0});
   btSoftBody& body = sim.add_jelly(make_ball(0.3, 2), {.attach = {.step = {.damping_time = 0.02, .drag = 0.5}}});
   btRigidBody& hand = sim.add_box({0.05, 0.05, 0.05}, 0, {0, 0.8, 0});
-  hand.setCollisionFlags(hand.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT | btCollisionObject::CF_NO_CONTACT_RESPONSE);
+  hand.setCollisionFlags(hand.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT |
+                         btCollisionObject::CF_NO_CONTACT_RESPONSE);
   hand.setActivationState(DISABLE_DEACTIVATION);
   const int top = nearest(body, {0, 0.3, 0});
   Eigen::Matrix3Xd rest(3, 2);
   rest << to_vector(body.m_nodes[top].m_x), Vector3(0, 0.8, 0);
   PotentialField rope(rest);
   rope.add<Length>(std::vector<Edge>{{0, 1}}, 100).set_free_play(-infinite, 0);
-  const int coupling = sim.penalty().couple({CouplingPoint::at_node(body, top), CouplingPoint::on(hand, {0, 0, 0})}, std::move(rope), 0.01);
+  const int coupling = sim.penalty().couple({CouplingPoint::at_node(body, top), CouplingPoint::on(hand, {0, 0, 0})},
+                                            std::move(rope), 0.01);
   sim.step(frame, 600);
   // At rest the rope carries the weight of 1 kg.
   const Real pull = [&] {
-    const Real length = (to_vector(body.m_nodes[top].m_x) - Vector3(0, 0.8, 0)).norm(), rest_length = (rest.col(1) - rest.col(0)).norm();
+    const Real length = (to_vector(body.m_nodes[top].m_x) - Vector3(0, 0.8, 0)).norm(),
+               rest_length = (rest.col(1) - rest.col(0)).norm();
     return 100 * (length / rest_length - 1) / rest_length;
   }();
   EXPECT_NEAR(pull, 9.81, 0.05);
@@ -179,7 +187,8 @@ TEST_P(Attachments, RefuseWhatCannotBeAndSayWhich) {
   };
   const CouplingPoint node = CouplingPoint::at_node(body, 0), rigid = CouplingPoint::on(box, {0, 0, 0});
   EXPECT_EQ(refusal({node, rigid}, 3), "couple: the field has 3 particles for 2 points");
-  EXPECT_EQ(refusal({node, CouplingPoint::at_node(body, 8)}, 2), "couple: point 1: node 8 is outside the 8 of its body");
+  EXPECT_EQ(refusal({node, CouplingPoint::at_node(body, 8)}, 2),
+            "couple: point 1: node 8 is outside the 8 of its body");
   EXPECT_EQ(refusal({node, node}, 2), "couple: point 1: node 0 is point 0 already");
   EXPECT_EQ(refusal({rigid}, 1), "couple: none of the 1 points is of a soft body");
   EXPECT_EQ(refusal({node, CouplingPoint{}}, 2), "couple: point 1: must be of one body, soft or rigid");
@@ -193,7 +202,8 @@ TEST_P(Attachments, GoWithTheSoftBody) {
   btSoftBody& second = sim.add_jelly(make_box({1, 1, 1}, {1, 1, 1}), {.shift = {3, 0, 0}});
   PotentialField rope((Eigen::Matrix3Xd(3, 2) << 0, 3, 0, 0, 0, 0).finished());
   rope.add<Length>(std::vector<Edge>{{0, 1}}, 10);
-  const int coupling = sim.penalty().couple({CouplingPoint::at_node(first, 0), CouplingPoint::at_node(second, 0)}, std::move(rope));
+  const int coupling =
+      sim.penalty().couple({CouplingPoint::at_node(first, 0), CouplingPoint::at_node(second, 0)}, std::move(rope));
   sim.step(frame);
   sim.remove(second);
   sim.step(frame);

@@ -61,8 +61,8 @@ INSTANTIATE_TEST_SUITE_P(World, TorusDrop, both_worlds(), param_name);
 TEST_P(Ground, AHeavyBoxPressesTheTorusAndComesToRestOnIt) {
   sim.add_ground();
   const TetMesh torus = make_torus(0.7, 0.3, 2, 18);
-  btSoftBody& body = sim.add_jelly(torus, {.shift = {0, 0.022 - torus.vertices.row(1).minCoeff(), 0},
-                                           .attach = {.step = {.damping_time = 0.002}}});
+  btSoftBody& body = sim.add_jelly(
+      torus, {.shift = {0, 0.022 - torus.vertices.row(1).minCoeff(), 0}, .attach = {.step = {.damping_time = 0.002}}});
   btRigidBody& box = sim.add_box({0.6, 0.15, 0.6}, 10, {0, 0.622 + 0.3 + 0.15, 0});
   Real peak = 0;
   for (int k = 0; k < 240; ++k) {
@@ -83,8 +83,8 @@ TEST_P(Ground, AHeavyBoxPressesTheTorusAndComesToRestOnIt) {
 TEST_P(Ground, ATorusOnABoxOnTheGroundLeavesTheBoxAtRest) {
   sim.add_ground();
   const TetMesh torus = make_torus(0.7, 0.3, 2, 18);
-  btSoftBody& body = sim.add_jelly(torus, {.shift = {0, 0.422 - torus.vertices.row(1).minCoeff(), 0},
-                                           .attach = {.step = {.damping_time = 0.002}}});
+  btSoftBody& body = sim.add_jelly(
+      torus, {.shift = {0, 0.422 - torus.vertices.row(1).minCoeff(), 0}, .attach = {.step = {.damping_time = 0.002}}});
   btRigidBody& box = sim.add_box({1.2, 0.2, 1.2}, 5, {0, 0.2, 0});
   sim.step(frame, 180);
   Real largest_speed = 0, largest_offset = 0;

@@ -15,7 +15,8 @@ class Reference : public WorldTest {
     Random random(7);
     for (int i = 0; i < body.m_nodes.size(); ++i) {
       const Vector3 x = ball.vertices.col(i);
-      body.m_nodes[i].m_v = to_bullet(Vector3(Vector3(1, -0.5, 0.25) + Vector3(0.5, 1, 2).cross(x) + random.vector(0.5)));
+      body.m_nodes[i].m_v =
+          to_bullet(Vector3(Vector3(1, -0.5, 0.25) + Vector3(0.5, 1, 2).cross(x) + random.vector(0.5)));
       body.m_nodes[i].m_x *= static_cast<btScalar>(1.125);
     }
     rest_ = ball;
@@ -36,7 +37,8 @@ class Reference : public WorldTest {
 
   // What the world hands on as time step: the classic one rounds it to single precision.
   Real handed_on(Real duration) const {
-    return GetParam() == WorldKind::classic ? Real(static_cast<float>(duration)) : Real(static_cast<btScalar>(duration));
+    return GetParam() == WorldKind::classic ? Real(static_cast<float>(duration))
+                                            : Real(static_cast<btScalar>(duration));
   }
 
   TetMesh rest_;
@@ -172,7 +174,8 @@ TEST_P(Reference, SameStartSameEndToTheLastBit) {
     again.step(1.0 / 60, 60);
     std::vector<Real> state;
     for (const btSoftBody* body : {&upper, &lower})
-      for (const PackedVectors* v : {&again.penalty().particles(*body).positions, &again.penalty().particles(*body).velocities})
+      for (const PackedVectors* v :
+           {&again.penalty().particles(*body).positions, &again.penalty().particles(*body).velocities})
         state.insert(state.end(), v->data(), v->data() + v->size());
     for (int axis = 0; axis < 3; ++axis) state.push_back(Real(box.getWorldTransform().getOrigin()[axis]));
     return state;

@@ -63,9 +63,7 @@ class Landing : public WorldTest {
 
 TEST_P(Landing, Sphere) { land(std::make_unique<btSphereShape>(30), Matrix3::Identity(), 30); }
 
-TEST_P(Landing, Box) {
-  land(std::make_unique<btBoxShape>(btVector3(1, 0.5, 1)), turned(0.4, Vector3::UnitY()), 0.5);
-}
+TEST_P(Landing, Box) { land(std::make_unique<btBoxShape>(btVector3(1, 0.5, 1)), turned(0.4, Vector3::UnitY()), 0.5); }
 
 TEST_P(Landing, BoxOnItsSide) {
   land(std::make_unique<btBoxShape>(btVector3(0.5, 1, 1)), turned(pi / 2, Vector3::UnitZ()), 0.5);
@@ -101,7 +99,8 @@ TEST_P(Landing, ConvexHull) {
 }
 
 TEST_P(Landing, StaticPlane) {
-  land(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), btScalar(0.25)), turned(-pi / 2, Vector3::UnitX()), 0.25);
+  land(std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), btScalar(0.25)), turned(-pi / 2, Vector3::UnitX()),
+       0.25);
 }
 
 TEST_P(Landing, Compound) {

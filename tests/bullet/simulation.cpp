@@ -122,7 +122,8 @@ std::unique_ptr<btSoftBody> Simulation::take_out(btSoftBody& body) {
     dynamic_cast<btSoftRigidDynamicsWorld&>(*world_).removeSoftBody(&body);
   else
     deformable_world().removeSoftBody(&body);
-  const auto found = std::find_if(soft_bodies_.begin(), soft_bodies_.end(), [&](const auto& b) { return b.get() == &body; });
+  const auto found =
+      std::find_if(soft_bodies_.begin(), soft_bodies_.end(), [&](const auto& b) { return b.get() == &body; });
   std::unique_ptr<btSoftBody> taken = std::move(*found);
   soft_bodies_.erase(found);
   return taken;
@@ -161,8 +162,8 @@ Totals Simulation::totals() const {
     const Vector3 x = to_vector(body->getWorldTransform().getOrigin()), v = to_vector(body->getLinearVelocity());
     const Vector3 w = to_vector(body->getAngularVelocity());
     const Matrix3 rotation = to_matrix(body->getWorldTransform().getBasis());
-    const Vector3 spin = rotation * to_vector(body->getInvInertiaDiagLocal()).cwiseInverse().asDiagonal() *
-                         rotation.transpose() * w;
+    const Vector3 spin =
+        rotation * to_vector(body->getInvInertiaDiagLocal()).cwiseInverse().asDiagonal() * rotation.transpose() * w;
     sum.momentum += mass * v;
     sum.angular_momentum += mass * x.cross(v) + spin;
     sum.energy += mass * v.squaredNorm() / 2 + w.dot(spin) / 2 - mass * gravity.dot(x);

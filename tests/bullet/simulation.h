@@ -99,7 +99,7 @@ inline std::string param_name(const ::testing::TestParamInfo<WorldKind>& info) {
 
 void let_sleep(btCollisionObject& object);
 Vector3 center_of_mass(const Particles& particles);
-Real lowest(const btSoftBody& body);  // y of the lowest node [m]
+Real lowest(const btSoftBody& body);                                            // y of the lowest node [m]
 Real mean_volume_error(const AttachedBodies& penalty, const btSoftBody& body);  // mean |V/V0 - 1|
 TetMesh moved(TetMesh mesh, const Vector3& shift);
 

@@ -72,8 +72,8 @@ TEST_P(Sleeping, ARigidBodyThatRestsOnItSleepsToo) {
   let_sleep(box);
   const Real time = time_to_sleep({&table, &box});
   RecordProperty("seconds", std::to_string(time));
-  EXPECT_GT(time, 2) << "box " << box.getActivationState() << " at " << box.getLinearVelocity().length() << " m/s, soft body "
-                     << table.getActivationState();
+  EXPECT_GT(time, 2) << "box " << box.getActivationState() << " at " << box.getLinearVelocity().length()
+                     << " m/s, soft body " << table.getActivationState();
   const Real y = Real(box.getWorldTransform().getOrigin().y());
   sim.step(frame, 120);
   EXPECT_NEAR(Real(box.getWorldTransform().getOrigin().y()), y, 1e-3) << "and neither sinks while asleep";
@@ -86,7 +86,8 @@ class SleepingTied : public WorldTest {
     sim.set_gravity({0, -9.81, 0});
     sim.add_ground();
     for (int k = 0; k < 3; ++k) {
-      bodies[k] = &sim.add_jelly(make_ball(0.3, 2), {.shift = {0.9 * k, 0.35, 0}, .attach = {.step = {.damping_time = 0.02}}});
+      bodies[k] =
+          &sim.add_jelly(make_ball(0.3, 2), {.shift = {0.9 * k, 0.35, 0}, .attach = {.step = {.damping_time = 0.02}}});
       let_sleep(*bodies[k]);
     }
     for (const int k : first_rope_first ? std::array{0, 1} : std::array{1, 0}) ropes[k] = couple(k, k + 1);
@@ -125,7 +126,8 @@ TEST_P(SleepingTied, TheyFallAsleepTogetherAndTheWholeChainWakesAtOneEnd) {
     for (int i = 0; i < bodies[2]->m_nodes.size(); ++i) bodies[2]->m_nodes[i].m_v = btVector3(4, 0, 0);
     const Real before = center_of_mass(sim.penalty().particles(*bodies[0])).x();
     sim.step(frame, 60);
-    EXPECT_GT(center_of_mass(sim.penalty().particles(*bodies[0])).x(), before + 0.05) << "the last one was dragged along";
+    EXPECT_GT(center_of_mass(sim.penalty().particles(*bodies[0])).x(), before + 0.05)
+        << "the last one was dragged along";
   }
 }
 
@@ -162,7 +164,8 @@ class SlowPendulum : public WorldTest {};
 
 TEST_P(SlowPendulum, SwingsOn) {
   sim.set_gravity({0, -9.81, 0});
-  btSoftBody& post = sim.add_jelly(make_box({0.2, 0.2, 0.2}, {1, 1, 1}), {.body = {.pinned = {0, 1, 2, 3, 4, 5, 6, 7}}});
+  btSoftBody& post =
+      sim.add_jelly(make_box({0.2, 0.2, 0.2}, {1, 1, 1}), {.body = {.pinned = {0, 1, 2, 3, 4, 5, 6, 7}}});
   btRigidBody& weight = sim.add_box({0.05, 0.05, 0.05}, 1, {0.15, -1.5, 0});
   let_sleep(weight);
   const Vector3 top = to_vector(post.m_nodes[0].m_x);
@@ -174,7 +177,8 @@ TEST_P(SlowPendulum, SwingsOn) {
   Real late_swing = 0;
   for (int step = 0; step < 720; ++step) {
     sim.step(frame);
-    if (step > 480) late_swing = std::max(late_swing, std::abs(Real(weight.getWorldTransform().getOrigin().x()) - top.x()));
+    if (step > 480)
+      late_swing = std::max(late_swing, std::abs(Real(weight.getWorldTransform().getOrigin().x()) - top.x()));
   }
   EXPECT_GT(late_swing, 0.6 * std::abs(0.15 - top.x())) << "after 8 s";
 }

@@ -53,7 +53,8 @@ TEST_P(Squashed, ABodyOfBulletsTetrahedraStaysFlat) {
 
 TEST_P(Squashed, TheSameBodyAttachedRecovers) {
   btSoftBody& body = add_squashed_box(sim, mesh);
-  sim.penalty().attach(body, make_elastic_field(mesh.vertices, mesh.tetrahedra, 10.0), {.step = {.damping_time = 0.01}});
+  sim.penalty().attach(body, make_elastic_field(mesh.vertices, mesh.tetrahedra, 10.0),
+                       {.step = {.damping_time = 0.01}});
   EXPECT_NEAR(height(body), 0.2, 1e-6);
   sim.step(frame, 120);
   EXPECT_NEAR(height(body), 1, 0.02);
@@ -155,8 +156,9 @@ class BesideOurs : public ::testing::TestWithParam<WorldKind> {
     void hang_in(Simulation& simulation, WorldKind kind) {
       simulation.set_gravity({0, -9.75, 0});
       simulation.add_box({0.3, 0.3, 0.3}, 0, {0, -0.4, 0.3});
-      std::unique_ptr<btSoftBody> made(btSoftBodyHelpers::CreatePatch(
-          simulation.info(), btVector3(-1, 0, -1), btVector3(1, 0, -1), btVector3(-1, 0, 1), btVector3(1, 0, 1), 9, 9, 3, true));
+      std::unique_ptr<btSoftBody> made(btSoftBodyHelpers::CreatePatch(simulation.info(), btVector3(-1, 0, -1),
+                                                                      btVector3(1, 0, -1), btVector3(-1, 0, 1),
+                                                                      btVector3(1, 0, 1), 9, 9, 3, true));
       made->getCollisionShape()->setMargin(btScalar(0.05));
       const bool deformable = kind == WorldKind::deformable;
       if (deformable) made->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
@@ -183,7 +185,8 @@ TEST_P(BesideOurs, ABodyOfBulletsMovesAsInAWorldWithoutThePlugin) {
     bullet.step(1.0 / 64);
     both.step(1.0 / 64);
     for (int i = 0; i < alone.body->m_nodes.size(); ++i)
-      ASSERT_EQ((alone.body->m_nodes[i].m_x - mixed.body->m_nodes[i].m_x).length(), 0) << "step " << step << ", node " << i;
+      ASSERT_EQ((alone.body->m_nodes[i].m_x - mixed.body->m_nodes[i].m_x).length(), 0)
+          << "step " << step << ", node " << i;
   }
   EXPECT_LT(lowest(*mixed.body), -0.3) << "the cloth hangs";
   EXPECT_NEAR(center_of_mass(both.penalty().particles(ours)).y(), 5 - 9.75 * 60 * 60 / 64 / 64 / 2, 1e-5);
@@ -213,14 +216,17 @@ TEST_P(ImplicitWorld, IsTheSameForWorldsOfAttachedBodiesOnly) {
   for (Simulation* s : {&sim, &implicit}) {
     s->set_gravity({0, -9.75, 0});
     s->add_ground();
-    bodies.push_back(&s->add_jelly(make_ball(0.3, 2), {.shift = {0, 0.5, 0}, .attach = {.step = {.damping_time = 0.002}}}));
+    bodies.push_back(
+        &s->add_jelly(make_ball(0.3, 2), {.shift = {0, 0.5, 0}, .attach = {.step = {.damping_time = 0.002}}}));
     s->add_box({0.1, 0.1, 0.1}, 0.3, {0.05, 1.1, 0});
   }
   for (int step = 0; step < 90; ++step) {
     sim.step(1.0 / 64);
     implicit.step(1.0 / 64);
-    ASSERT_EQ(sim.penalty().particles(*bodies[0]).positions, implicit.penalty().particles(*bodies[1]).positions) << step;
-    ASSERT_EQ(sim.penalty().particles(*bodies[0]).velocities, implicit.penalty().particles(*bodies[1]).velocities) << step;
+    ASSERT_EQ(sim.penalty().particles(*bodies[0]).positions, implicit.penalty().particles(*bodies[1]).positions)
+        << step;
+    ASSERT_EQ(sim.penalty().particles(*bodies[0]).velocities, implicit.penalty().particles(*bodies[1]).velocities)
+        << step;
   }
 }
 

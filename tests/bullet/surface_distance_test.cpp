@@ -57,7 +57,8 @@ void expect_distance(const btCollisionShape& shape, const Distance& distance, Re
     ASSERT_EQ(found.size(), 1u);
     const Real limit = expected < 0 ? inside_tolerance : tolerance;
     inside += expected < 0;
-    (expected < 0 ? worst_inside : worst) = std::max(expected < 0 ? worst_inside : worst, std::abs(found[0].distance - expected));
+    (expected < 0 ? worst_inside : worst) =
+        std::max(expected < 0 ? worst_inside : worst, std::abs(found[0].distance - expected));
     ASSERT_NEAR(found[0].distance, expected, limit);
     ASSERT_NEAR(distance(found[0].point), 0, limit);
     ASSERT_NEAR(found[0].normal.norm(), 1, 1e-3);
@@ -71,7 +72,8 @@ void expect_distance(const btCollisionShape& shape, const Distance& distance, Re
 
 TEST(SurfaceDistance, OfASphere) {
   const btSphereShape sphere(0.75);
-  expect_distance(sphere, [](const Vector3& p) { return p.norm() - 0.75; }, 1e-12, 1e-12);
+  expect_distance(
+      sphere, [](const Vector3& p) { return p.norm() - 0.75; }, 1e-12, 1e-12);
   const std::vector<SurfacePoint> center = surface_points(sphere, {0, 0, 0});
   ASSERT_EQ(center.size(), 1u);
   EXPECT_NEAR(center[0].distance, -0.75, 1e-12);
@@ -81,7 +83,8 @@ TEST(SurfaceDistance, OfASphere) {
 TEST(SurfaceDistance, OfABox) {
   const Vector3 half(0.5, 0.25, 1);
   const btBoxShape box(to_bullet(half));
-  expect_distance(box, [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-7), limit(1e-12, 1e-7));
+  expect_distance(
+      box, [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-7), limit(1e-12, 1e-7));
 }
 
 TEST(SurfaceDistance, OfCapsulesAlongEachAxis) {
@@ -100,7 +103,8 @@ TEST(SurfaceDistance, OfCapsulesAlongEachAxis) {
 TEST(SurfaceDistance, OfAPlane) {
   const Vector3 normal = Vector3(1, 2, 2) / 3;
   const btStaticPlaneShape plane(to_bullet(normal), static_cast<btScalar>(0.25));
-  expect_distance(plane, [&](const Vector3& p) { return normal.dot(p) - 0.25; }, limit(1e-12, 1e-6), limit(1e-12, 1e-6));
+  expect_distance(
+      plane, [&](const Vector3& p) { return normal.dot(p) - 0.25; }, limit(1e-12, 1e-6), limit(1e-12, 1e-6));
 }
 
 // Bullet rounds these by their collision margin: a core, swept by a small sphere. Inside, EPA approximates curved
@@ -109,14 +113,22 @@ TEST(SurfaceDistance, OfACylinder) {
   const btCylinderShape cylinder(btVector3(0.5, 0.75, 0.5));
   const Real m = Real(cylinder.getMargin()), r = 0.5 - m, h = 0.75 - m;
   expect_distance(
-      cylinder, [&](const Vector3& p) { return revolved_distance(p, {{0, -h}, {r, -h}, {r, h}, {0, h}}) - m; }, limit(1e-4, 5e-4), 5e-3);
+      cylinder,
+      [&](const Vector3& p) {
+        return revolved_distance(p, {{0, -h}, {r, -h}, {r, h}, {0, h}}) - m;
+      },
+      limit(1e-4, 5e-4), 5e-3);
 }
 
 TEST(SurfaceDistance, OfACone) {
   const btConeShape cone(static_cast<btScalar>(0.6), static_cast<btScalar>(1.2));
   const Real m = Real(cone.getMargin());
   expect_distance(
-      cone, [&](const Vector3& p) { return revolved_distance(p, {{0, -0.6}, {0.6, -0.6}, {0, 0.6}}) - m; }, limit(1e-4, 5e-4), 5e-3, 0.8);
+      cone,
+      [&](const Vector3& p) {
+        return revolved_distance(p, {{0, -0.6}, {0.6, -0.6}, {0, 0.6}}) - m;
+      },
+      limit(1e-4, 5e-4), 5e-3, 0.8);
 }
 
 TEST(SurfaceDistance, OfAConvexHull) {
@@ -126,7 +138,8 @@ TEST(SurfaceDistance, OfAConvexHull) {
     hull.addPoint(to_bullet(Vector3(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
                                     corner & 4 ? half.z() : -half.z())));
   const Real m = Real(hull.getMargin());
-  expect_distance(hull, [&](const Vector3& p) { return box_distance(p, half) - m; }, limit(1e-6, 1e-3), limit(1e-6, 2e-3));
+  expect_distance(
+      hull, [&](const Vector3& p) { return box_distance(p, half) - m; }, limit(1e-6, 1e-3), limit(1e-6, 2e-3));
 }
 
 TEST(SurfaceDistance, OfACompoundIsOnePointForEachChild) {
@@ -185,16 +198,26 @@ Mesh box_mesh(const Vector3& half, Real margin) {
     vertices.emplace_back(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
                           corner & 4 ? half.z() : -half.z());
   return {vertices,
-          {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6},
-           {1, 3, 5}, {3, 7, 5}},
+          {{0, 2, 1},
+           {1, 2, 3},
+           {4, 5, 6},
+           {5, 7, 6},
+           {0, 1, 4},
+           {1, 5, 4},
+           {2, 6, 3},
+           {3, 6, 7},
+           {0, 4, 2},
+           {2, 4, 6},
+           {1, 3, 5},
+           {3, 7, 5}},
           margin};
 }
 
 TEST(SurfaceDistance, OfATriangleMeshIsThatOfTheSolidThatItBounds) {
   const Vector3 half(0.5, 0.4, 0.7);
   const Mesh mesh = box_mesh(half, 0);
-  expect_distance(mesh.shape(), [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-6),
-                  limit(1e-12, 1e-6));
+  expect_distance(
+      mesh.shape(), [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-6), limit(1e-12, 1e-6));
 }
 
 TEST(SurfaceDistance, OfATriangleMeshIsLiftedByItsMargin) {

@@ -75,8 +75,9 @@ TEST(StaticRecovery, OfStiffBulkNeedsTwoPhases) {
   for (std::uint32_t seed = 1; seed <= 10; ++seed) {
     const TetMesh mesh = cube(4);
     EXPECT_LT(recovering(mesh, Start::scramble, seed, stiff_bulk).rest_error, 1e-6) << "seed " << seed;
-    const Outcome outcome = relaxed(
-        make_elastic_field(mesh.vertices, mesh.tetrahedra, stiff_bulk, ElasticModel::neo_hookean), mesh, Start::scramble, seed);
+    const Outcome outcome =
+        relaxed(make_elastic_field(mesh.vertices, mesh.tetrahedra, stiff_bulk, ElasticModel::neo_hookean), mesh,
+                Start::scramble, seed);
     direct += outcome.recovered();
   }
   EXPECT_LE(direct, 2) << "without two phases it winds itself up";

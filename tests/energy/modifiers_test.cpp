@@ -2,14 +2,15 @@
 #include "penalty/energy/modifiers.h"
 
 #include "math/random.h"
-#include "penalty/kinds/length.h"
 #include "penalty/energy/penalty_energy.h"
+#include "penalty/kinds/length.h"
 
 namespace penalty::testing {
 namespace {
 
 TEST(Profile, ResistsWhatIsOutsideItsFreePlay) {
-  const Profile rope{.lower = -infinite}, stop{.upper = infinite}, between{.target = 0.5, .lower = -0.125, .upper = 0.25};
+  const Profile rope{.lower = -infinite}, stop{.upper = infinite},
+      between{.target = 0.5, .lower = -0.125, .upper = 0.25};
   EXPECT_EQ(rope.strain(-0.7), 0);
   EXPECT_EQ(rope.strain(0.3), 0.3);
   EXPECT_EQ(stop.strain(-0.7), -0.7);

@@ -55,7 +55,8 @@ Moduli measured(const PotentialField& field) {
   const PackedVectors& rest = field.rest_positions();
   const Eigen::Index num_particles = rest.cols();
   Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, num_particles);
-  Eigen::Array<bool, 3, Eigen::Dynamic> fixed = Eigen::Array<bool, 3, Eigen::Dynamic>::Constant(3, num_particles, false);
+  Eigen::Array<bool, 3, Eigen::Dynamic> fixed =
+      Eigen::Array<bool, 3, Eigen::Dynamic>::Constant(3, num_particles, false);
   for (Eigen::Index i = 0; i < num_particles; ++i) {
     const Vector3 p = rest.col(i).head<3>();
     const bool top = p.z() > 1 - 1e-9, bottom = p.z() < 1e-9;
@@ -90,7 +91,8 @@ Real tip_over_timoshenko(int cells_across, const Material& material, ElasticMode
   const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, material, model);
   const Eigen::Index num_particles = mesh.vertices.cols();
   const Vector3 low = mesh.vertices.rowwise().minCoeff(), high = mesh.vertices.rowwise().maxCoeff();
-  Eigen::Array<bool, 3, Eigen::Dynamic> fixed = Eigen::Array<bool, 3, Eigen::Dynamic>::Constant(3, num_particles, false);
+  Eigen::Array<bool, 3, Eigen::Dynamic> fixed =
+      Eigen::Array<bool, 3, Eigen::Dynamic>::Constant(3, num_particles, false);
   Eigen::Matrix3Xd load = Eigen::Matrix3Xd::Zero(3, num_particles);
   Real weight = 0;
   for (Eigen::Index i = 0; i < num_particles; ++i) {
@@ -138,8 +140,8 @@ TEST(Material, NeoHookeanHasExactModuliOnAnyMesh) {
     for (const int cells : {2, 4, 8}) {
       SCOPED_TRACE("Poisson's ratio " + std::to_string(poisson) + ", cells " + std::to_string(cells));
       const TetMesh mesh = cube(cells);
-      const Moduli m = measured(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1, .poisson = poisson},
-                                                   ElasticModel::neo_hookean));
+      const Moduli m = measured(make_elastic_field(
+          mesh.vertices, mesh.tetrahedra, Material{.young = 1, .poisson = poisson}, ElasticModel::neo_hookean));
       EXPECT_NEAR(m.young, 1, 1e-3);
       EXPECT_NEAR(m.poisson, poisson, 1e-3);
     }
@@ -150,8 +152,9 @@ TEST(Material, SpringsWithAreasDoNotDependOnTheMeshEither) {
     std::vector<Real> young;
     for (const int cells : {2, 4, 8}) {
       const TetMesh mesh = cube(cells);
-      young.push_back(measured_young(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1, .poisson = poisson},
-                                                        ElasticModel::springs_areas_volumes)));
+      young.push_back(
+          measured_young(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1, .poisson = poisson},
+                                            ElasticModel::springs_areas_volumes)));
     }
     const auto [least, most] = std::minmax_element(young.begin(), young.end());
     EXPECT_LT(*most / *least, 1.03) << young[0] << " " << young[1] << " " << young[2];
@@ -227,7 +230,8 @@ TEST(ElasticField, AtPoissonOneQuarterHasNoVolumeBatch) {
 
 TEST(ElasticField, DampsAsItsMaterialSays) {
   const TetMesh mesh = cube(1);
-  for (const ElasticModel model : {ElasticModel::springs_volumes, ElasticModel::springs_areas_volumes, ElasticModel::neo_hookean}) {
+  for (const ElasticModel model :
+       {ElasticModel::springs_volumes, ElasticModel::springs_areas_volumes, ElasticModel::neo_hookean}) {
     EXPECT_FALSE(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{}, model).damps());
     const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.damping = 0.02}, model);
     EXPECT_TRUE(field.damps());

@@ -27,12 +27,14 @@ TEST(ElementBatch, RefusalsNameBatchElementAndValue) {
   EXPECT_EQ(refusal([](B b) { b.set_enabled(-1, true); }), "length: there is no element -1 among the 3");
   EXPECT_EQ(refusal([&](B b) { b.set_target(1, nan); }), "length 1: target is nan, must be finite");
   EXPECT_EQ(refusal([](B b) { b.set_stiffness(2, -1); }), "length 2: stiffness is -1 J, must be positive and finite");
-  EXPECT_EQ(refusal([](B b) { b.set_stiffness(2, infinite); }), "length 2: stiffness is inf J, must be positive and finite");
+  EXPECT_EQ(refusal([](B b) { b.set_stiffness(2, infinite); }),
+            "length 2: stiffness is inf J, must be positive and finite");
   EXPECT_EQ(refusal([](B b) { b.set_free_play(0, 0.2, 0.1); }), "length 0: free play from 0.2 to 0.1 is empty");
   EXPECT_EQ(refusal([&](B b) { b.set_free_play(0, nan, 0.1); }), "length 0: free play from nan to 0.1 is empty");
   EXPECT_EQ(refusal([](B b) { b.set_free_play(0, infinite, infinite); }),
             "length 0: free play from inf to inf has no finite strain");
-  EXPECT_EQ(refusal([](B b) { b.set_damping_time(1, -0.1); }), "length 1: damping time is -0.1 s, must be zero or positive");
+  EXPECT_EQ(refusal([](B b) { b.set_damping_time(1, -0.1); }),
+            "length 1: damping time is -0.1 s, must be zero or positive");
   EXPECT_EQ(refusal([](B b) { b.set_plasticity(1, {.yield = -2}); }),
             "plasticity: yield is -2, must be zero or positive");
   EXPECT_EQ(refusal([](B b) { b.set_breaking(1, {.upper = -2}); }), "breaking: upper strain is -2, must be positive");
@@ -53,9 +55,10 @@ TEST(ElementBatch, FreePlayOfAnEnergyHoldsItsRestState) {
   PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{}, ElasticModel::neo_hookean);
   ElementBatch& batch = *field.find("stable neo-Hookean");
   EXPECT_NO_THROW(batch.set_free_play(0, -infinite, 0.1));
-  EXPECT_EQ(complaint<std::invalid_argument>([&] { batch.set_free_play(0, 0.1, 0.2); }),
-            "stable neo-Hookean 0: free play from 0.1 to 0.2 must hold 0 and end: an energy of its own is zero at rest and "
-            "nowhere negative");
+  EXPECT_EQ(
+      complaint<std::invalid_argument>([&] { batch.set_free_play(0, 0.1, 0.2); }),
+      "stable neo-Hookean 0: free play from 0.1 to 0.2 must hold 0 and end: an energy of its own is zero at rest and "
+      "nowhere negative");
   EXPECT_THROW(batch.set_free_play(0, 0, infinite), std::invalid_argument);
 }
 
@@ -206,7 +209,9 @@ TEST(ElementBatch, LedgerSaysHowManyHowMuchAndWhere) {
 
 TEST(PotentialField, NamesTheBatchInItsErrors) {
   Strip strip;
-  EXPECT_EQ(complaint<std::invalid_argument>([&] { strip.field.add<Length>(std::vector<Edge>{{0, 1}, {2, 2}}, 1, "brace"); }),
+  EXPECT_EQ(complaint<std::invalid_argument>([&] {
+              strip.field.add<Length>(std::vector<Edge>{{0, 1}, {2, 2}}, 1, "brace");
+            }),
             "brace 1: index 2 appears twice");
 }
 
@@ -214,7 +219,8 @@ TEST(PotentialField, GroupsOfAnySizeAreCheckedLikeOthers) {
   Random random(2);
   PotentialField field(random.vectors<Eigen::Dynamic>(12, 1));
   const auto refusal_of = [&](std::vector<int> stencil) {
-    return complaint<std::invalid_argument>([&] { field.add(ShapeMatch(), std::vector<std::vector<int>>{stencil}, 1); });
+    return complaint<std::invalid_argument>(
+        [&] { field.add(ShapeMatch(), std::vector<std::vector<int>>{stencil}, 1); });
   };
   EXPECT_EQ(refusal_of({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 4}), "shape match 0: index 4 appears twice");
   EXPECT_EQ(refusal_of({0, 1, 12}), "shape match 0: index 12 is outside the 12 particles");
@@ -237,8 +243,7 @@ struct Wrong {
 
 TEST(PotentialField, RefusesAKindWhoseGradientIsWrongAndSaysBothNumbers) {
   PotentialField field((Eigen::Matrix3Xd(3, 2) << 0, 1, 0, 0, 0, 0).finished());
-  const std::string message =
-      complaint<std::invalid_argument>([&] { field.add<Wrong>(std::vector<Edge>{{0, 1}}, 1); });
+  const std::string message = complaint<std::invalid_argument>([&] { field.add<Wrong>(std::vector<Edge>{{0, 1}}, 1); });
   EXPECT_TRUE(message.starts_with("wrong 0: at rest, dC/dp")) << message;
   EXPECT_NE(message.find("is -1"), std::string::npos) << message;
   EXPECT_NE(message.find("differences give -2"), std::string::npos) << message;

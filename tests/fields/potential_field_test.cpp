@@ -228,8 +228,7 @@ TEST(PotentialField, RefusedElementsNameKindElementIndexAndValue) {
   EXPECT_EQ(refusal<Length>({{0, 1}, {-2, 1}}, {1, 1}), "length 1: index -2 is outside the 5 particles");
   EXPECT_EQ(refusal<TetrahedronVolume>({{0, 1, 2, 5}}, {1}),
             "tetrahedron volume 0: index 5 is outside the 5 particles");
-  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1, -3}),
-            "length 1: stiffness is -3 J, must be positive and finite");
+  EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}}, {1, -3}), "length 1: stiffness is -3 J, must be positive and finite");
   EXPECT_EQ(refusal<Length>({{0, 1}, {1, 2}, {2, 3}}, {1, 1, std::nan("")}),
             "length 2: stiffness is nan J, must be positive and finite");
   EXPECT_EQ(refusal<Length>({{0, 1}, {0, 4}}, {1, 1}), "length 1: length: rest length is 0");

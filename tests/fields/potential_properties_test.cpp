@@ -36,24 +36,30 @@ Kind prototype_of() {
 template <class Kind>
 KindCase own_kind() {
   constexpr int n = Kind::num_points;
-  return {std::string(Kind::name), n,
+  return {std::string(Kind::name),
+          n,
           [](PotentialField& field, Real k) -> ElementBatch& {
             std::array<int, static_cast<std::size_t>(n)> stencil;
             for (int i = 0; i < n; ++i) stencil[i] = i;
             return field.add(prototype_of<Kind>(), std::span(&stencil, 1), k);
           },
-          conserves_momentum<Kind>, Constraint<Kind>, HasHessian<Kind> || ElasticEnergy<Kind>};
+          conserves_momentum<Kind>,
+          Constraint<Kind>,
+          HasHessian<Kind> || ElasticEnergy<Kind>};
 }
 
 template <class Kind>
 KindCase group_kind(std::string name, const Kind& prototype, int n) {
-  return {std::move(name), n,
+  return {std::move(name),
+          n,
           [prototype, n](PotentialField& field, Real k) -> ElementBatch& {
             std::vector<int> stencil(n);
             for (int i = 0; i < n; ++i) stencil[i] = i;
             return field.add(prototype, std::span(&stencil, 1), k);
           },
-          true, Constraint<Kind>, HasHessian<Kind> || ElasticEnergy<Kind>};
+          true,
+          Constraint<Kind>,
+          HasHessian<Kind> || ElasticEnergy<Kind>};
 }
 
 template <class... Kinds>
@@ -80,8 +86,8 @@ const std::vector<KindCase>& kinds() {
                       const std::array<int, 3> stencil{0, 1, 2};
                       return field.add(fixed, std::span(&stencil, 1), k);
                     }});
-    const auto differenced = difference_constraint<3>(
-        [product](const Points<3>& p) -> Real { return product(p); }, RestValue::relative);
+    const auto differenced =
+        difference_constraint<3>([product](const Points<3>& p) -> Real { return product(p); }, RestValue::relative);
     list.push_back({"user constraint, differences", 3,
                     [differenced](PotentialField& field, Real k) -> ElementBatch& {
                       const std::array<int, 3> stencil{0, 1, 2};
@@ -142,7 +148,7 @@ std::vector<Case> cases() {
   return all;
 }
 
-std::vector<Case> cases_where(bool KindCase::* holds) {
+std::vector<Case> cases_where(bool KindCase::*holds) {
   std::vector<Case> some = cases();
   std::erase_if(some, [holds](const Case& c) { return !(c.first->*holds); });
   return some;
@@ -188,7 +194,13 @@ class PotentialProperties : public ::testing::TestWithParam<Case> {
       moved += random.vectors<Eigen::Dynamic>(n, 0.1);
       moved.colwise() += random.vector(1);
       if (!kind().conserves_momentum) moved = rest + random.vectors<Eigen::Dynamic>(n, 0.3);
-      State s{.kind = &kind(), .field = PotentialField(rest), .batch = nullptr, .x = {}, .v = {}, .dx = {}, .inverse_masses = {}};
+      State s{.kind = &kind(),
+              .field = PotentialField(rest),
+              .batch = nullptr,
+              .x = {},
+              .v = {},
+              .dx = {},
+              .inverse_masses = {}};
       try {
         s.batch = &kind().add(s.field, std::pow(10.0, random.uniform(-2, 4)));
       } catch (const std::invalid_argument&) {
@@ -276,7 +288,8 @@ TEST_P(ExactStiffness, IsMinusTheDerivativeOfTheForces) {
     Eigen::MatrixXd differences(k.rows(), k.cols());
     for (Eigen::Index i = 0; i < s.x.cols(); ++i)
       for (int axis = 0; axis < 3; ++axis) {
-        const PackedVectors column = derivative([&](const PackedVectors& x) { return forces(s.field, x); }, s.x, i, axis);
+        const PackedVectors column =
+            derivative([&](const PackedVectors& x) { return forces(s.field, x); }, s.x, i, axis);
         differences.col(3 * i + axis) = -column.topRows<3>().reshaped();
       }
     error.see(relative_error(k, differences), seed);
@@ -290,8 +303,8 @@ TEST_P(PotentialProperties, ProductAndDiagonalAreThoseOfTheAssembledStiffness) {
   WorstError product_error, diagonal_error;
   for (unsigned seed = 0; seed < num_states / 4; ++seed) {
     const State s = state(seed);
-    for (const StiffnessModel model : {StiffnessModel::gauss_newton, StiffnessModel::exact,
-                                       StiffnessModel::psd_projected, StiffnessModel::taut}) {
+    for (const StiffnessModel model :
+         {StiffnessModel::gauss_newton, StiffnessModel::exact, StiffnessModel::psd_projected, StiffnessModel::taut}) {
       if (s.is_slack && model != StiffnessModel::taut) continue;
       const Eigen::MatrixXd k = stiffness(s.field, s.x, model);
       PackedVectors df = PackedVectors::Zero(4, s.x.cols());
@@ -513,7 +526,8 @@ TEST_P(PotentialProperties, DegeneratePositionsGiveFiniteResults) {
 
 const auto name_of = [](const auto& tested) { return case_name(tested.param); };
 INSTANTIATE_TEST_SUITE_P(All, PotentialProperties, ::testing::ValuesIn(cases()), name_of);
-INSTANTIATE_TEST_SUITE_P(All, ExactStiffness, ::testing::ValuesIn(cases_where(&KindCase::has_exact_stiffness)), name_of);
+INSTANTIATE_TEST_SUITE_P(All, ExactStiffness, ::testing::ValuesIn(cases_where(&KindCase::has_exact_stiffness)),
+                         name_of);
 INSTANTIATE_TEST_SUITE_P(All, InternalForces, ::testing::ValuesIn(cases_where(&KindCase::conserves_momentum)), name_of);
 
 }  // namespace

@@ -120,9 +120,7 @@ TEST(TwoPhase, ListsBothPhasesAndCountsTheOneThatActs) {
 
 TEST(TwoPhase, RefusesWhatDoesNotFitTogether) {
   const TetMesh one = make_box({1, 1, 1}, {1, 1, 1}), two = make_box({1, 1, 1}, {2, 1, 1});
-  const auto field_of = [](const TetMesh& mesh) {
-    return make_elastic_field(mesh.vertices, mesh.tetrahedra, rubber);
-  };
+  const auto field_of = [](const TetMesh& mesh) { return make_elastic_field(mesh.vertices, mesh.tetrahedra, rubber); };
   const auto complaint_of = [&](const TetMesh& soft, const PhaseThresholds& thresholds) {
     return complaint<std::invalid_argument>(
         [&] { TwoPhase(one.tetrahedra, field_of(soft), field_of(one), thresholds); });
@@ -130,8 +128,10 @@ TEST(TwoPhase, RefusesWhatDoesNotFitTogether) {
   EXPECT_EQ(complaint_of(two, {}), "two phases: the soft field has 12 particles, the stiff one 8");
   EXPECT_EQ(complaint_of(one, {.enter = 0.2}),
             "two phases: thresholds are 0.2 to enter and 0.3 to leave, must be 0 < leave <= enter");
-  EXPECT_EQ(complaint<std::invalid_argument>([&] { TwoPhase(two.tetrahedra, field_of(one), field_of(one)); })
-                .rfind("two phases: tetrahedron ", 0), 0u);
+  EXPECT_EQ(complaint<std::invalid_argument>([&] {
+              TwoPhase(two.tetrahedra, field_of(one), field_of(one));
+            }).rfind("two phases: tetrahedron ", 0),
+            0u);
   const std::vector<Tetrahedron> flat{{0, 1, 2, 1}};
   EXPECT_EQ(complaint<std::invalid_argument>([&] { TwoPhase(flat, field_of(one), field_of(one)); }),
             "two phases: tetrahedron 0 has no volume at rest");

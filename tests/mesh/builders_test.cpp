@@ -62,7 +62,8 @@ TEST(MakeBox, SplitsCellsInSixAroundTheirDiagonal) {
   const TetMesh mesh = make_box({1, 2, 3}, {2, 5, 3}, BoxSplit::six);
   expect_positive(mesh);
   EXPECT_EQ(mesh.tetrahedra.size(), 180u);
-  for (const Real v : signed_volumes(mesh.vertices, mesh.tetrahedra)) EXPECT_NEAR(v, 6.0 / 180, 1e-14) << "all are equal";
+  for (const Real v : signed_volumes(mesh.vertices, mesh.tetrahedra))
+    EXPECT_NEAR(v, 6.0 / 180, 1e-14) << "all are equal";
   EXPECT_EQ(euler_characteristic(mesh), 1) << "faces match";
   EXPECT_EQ(boundary_euler_characteristic(mesh), 2);
   EXPECT_EQ(boundary_faces(mesh.tetrahedra).size(), 4u * (2 * 5 + 5 * 3 + 3 * 2));

@@ -35,8 +35,8 @@ int main() {
   const Eigen::VectorXd heights = solver.particles(*body).positions.row(1);
   std::printf("%zu-byte btScalar: after 2 s the box stands between %.3f and %.3f m\n", sizeof(btScalar),
               heights.minCoeff(), heights.maxCoeff());
-  const bool stands = heights.minCoeff() > -0.05 && heights.minCoeff() < 0.1 && heights.maxCoeff() > 0.8 &&
-                      heights.maxCoeff() < 1.1;
+  const bool stands =
+      heights.minCoeff() > -0.05 && heights.minCoeff() < 0.1 && heights.maxCoeff() > 0.8 && heights.maxCoeff() < 1.1;
 
   solver.detach(*body);
   world.removeSoftBody(body.get());

@@ -141,7 +141,8 @@ TEST(Coupling, AParticleOnARigidBodySwingsAtTheFrequencyOfTheReducedMass) {
   Real worst = 0;
   for (int step = 1; step <= 100; ++step) {
     advance({&body.body}, bodies, coupling, field, 0.02);
-    worst = std::max(worst, std::abs((body.position(0) - bodies[0].position).x() - 0.1 * std::cos(omega * 0.02 * step)));
+    worst =
+        std::max(worst, std::abs((body.position(0) - bodies[0].position).x() - 0.1 * std::cos(omega * 0.02 * step)));
   }
   EXPECT_LT(worst, 1e-4 * 0.1 * 10);
   EXPECT_LT((body.position(0) * 2 + bodies[0].position * 5 - Vector3(0.2, 0, 0)).norm(), 1e-13);

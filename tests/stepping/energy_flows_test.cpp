@@ -7,7 +7,8 @@ namespace {
 // The largest deviation of the balance over a run, relative to the largest energy in it.
 class Balance {
  public:
-  explicit Balance(const Body& body) : start_(body.body.potential->energy(body.particles().positions) + kinetic_energy(body.particles())) {
+  explicit Balance(const Body& body)
+      : start_(body.body.potential->energy(body.particles().positions) + kinetic_energy(body.particles())) {
     see_energy(start_);
   }
   void see(const Body& body) {
@@ -61,7 +62,8 @@ TEST(EnergyFlows, BalanceInADampedDropOnTheGround) {
   EXPECT_GT(flows.damping, 100);
   EXPECT_GT(flows.drag, 100);
   EXPECT_GT(flows.contact_loss, 100);
-  EXPECT_NEAR(flows.contacts, -flows.contact_loss, 1e-9 * std::abs(flows.contact_loss));  // ground at rest: contacts only take
+  EXPECT_NEAR(flows.contacts, -flows.contact_loss,
+              1e-9 * std::abs(flows.contact_loss));  // ground at rest: contacts only take
   EXPECT_LT(balance.relative(), 0.01);
   RecordProperty("balance", std::to_string(balance.relative()));
 }
@@ -172,7 +174,8 @@ TEST(EnergyGuard, RepeatsAStepWithTheModifiersAsTheyWereAtItsStart) {
   ASSERT_TRUE(repeated.body.report.finite);
   EXPECT_TRUE(repeated.field->find<Length>()->breaks().empty());
   for (int e = 0; e < 4; ++e)
-    EXPECT_NEAR(repeated.field->find<Length>()->plastic_strain(e), careful.field->find<Length>()->plastic_strain(e), 0.01);
+    EXPECT_NEAR(repeated.field->find<Length>()->plastic_strain(e), careful.field->find<Length>()->plastic_strain(e),
+                0.01);
 }
 
 }  // namespace

@@ -150,7 +150,8 @@ TEST(ImplicitStep, FallsAsGravityAndForcesSay) {
   const Real h = 1.0 / 60;
   for (int i = 0; i < cube.particles().size(); ++i) {
     EXPECT_LT((cube.velocity(i) - 30 * h * a).norm(), 1e-11);
-    EXPECT_LT((cube.position(i) - cube.field->rest_positions().col(i).head<3>() - h * h * a * 30 * 31 / 2).norm(), 1e-11);
+    EXPECT_LT((cube.position(i) - cube.field->rest_positions().col(i).head<3>() - h * h * a * 30 * 31 / 2).norm(),
+              1e-11);
   }
   EXPECT_NEAR(cube.body.flows.constant_forces, a.squaredNorm() * h * h * 30 * 31 / 2, 1e-9);
 }
@@ -248,7 +249,8 @@ TEST(ImplicitStep, LeavesABodyInContactToTheSubsteps) {
   Body cube = make_stretched_cube(1);
   std::vector<RigidBody> ground(1);
   ground[0].position = Vector3(0, -1, 0);
-  cube.body.contacts.push_back({.point = ContactPoint::at_particle(0), .rigid_body = 0, .anchor = {0, 0, 0}, .normal = {0, 1, 0}});
+  cube.body.contacts.push_back(
+      {.point = ContactPoint::at_particle(0), .rigid_body = 0, .anchor = {0, 0, 0}, .normal = {0, 1, 0}});
   advance(cube, 1.0 / 60, ground);
   EXPECT_EQ(cube.body.report.integrator, Integrator::explicit_step);
 }
@@ -267,9 +269,9 @@ TEST(ImplicitStep, UnfoldsWhatLiesInALine) {
   // A line is a state that no force leads out of.
   const TetMesh mesh = make_box({1, 1, 1}, {2, 2, 2});
   for (const bool unfold : {false, true}) {
-    Body cube = implicit(make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.poisson = 0},
-                                                      ElasticModel::neo_hookean),
-                                   std::vector<Real>(static_cast<std::size_t>(mesh.vertices.cols()), 27)));
+    Body cube = implicit(
+        make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.poisson = 0}, ElasticModel::neo_hookean),
+                  std::vector<Real>(static_cast<std::size_t>(mesh.vertices.cols()), 27)));
     cube.body.options.unfold = unfold;
     cube.particles().positions.topRows<2>().setZero();
     cube.body.positions_changed();

@@ -179,7 +179,8 @@ TEST(Relax, SaysWhatIsWrongWithItsInput) {
   EXPECT_EQ(complaint_of(rest, {.pinned = {2, 8}}), "relax: pinned particle 8 is outside the 8 of the field");
   EXPECT_EQ(complaint_of(rest, {.max_iterations = -1}), "relax: max_iterations is -1, must be zero or positive");
   EXPECT_EQ(complaint_of(rest, {.tolerance = 0}), "relax: tolerance is 0, must be positive");
-  EXPECT_EQ(complaint_of(rest, {.linear = {.max_iterations = 0}}), "relax: linear.max_iterations is 0, must be at least 1");
+  EXPECT_EQ(complaint_of(rest, {.linear = {.max_iterations = 0}}),
+            "relax: linear.max_iterations is 0, must be at least 1");
   EXPECT_EQ(complaint_of(rest, {.linear = {.tolerance = 1}}), "relax: linear.tolerance is 1, must be in (0, 1)");
 }
 

@@ -1,11 +1,11 @@
 // Everything an application includes to put penalty forces on its Bullet soft bodies.
 #pragma once
-#include "penalty/fields/potential_field.h"
-#include "penalty/fields/two_phase.h"
 #include "penalty/bullet/deformable_penalty_force.h"
 #include "penalty/bullet/penalty_deformable_body_solver.h"
 #include "penalty/bullet/penalty_soft_body_solver.h"
 #include "penalty/bullet/soft_body.h"
+#include "penalty/fields/potential_field.h"
+#include "penalty/fields/two_phase.h"
 #include "penalty/kinds/user_constraint.h"
 #include "penalty/mesh/builders.h"
 #include "penalty/mesh/embed.h"

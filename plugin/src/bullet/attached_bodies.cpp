@@ -152,7 +152,9 @@ PotentialField& AttachedBodies::edit_coupling(int coupling) {
   attached_->wake(attached);
   return attached.field;
 }
-Real AttachedBodies::coupling_energy(int coupling) const { return attached_->coupling(coupling).stepped.elastic_energy; }
+Real AttachedBodies::coupling_energy(int coupling) const {
+  return attached_->coupling(coupling).stepped.elastic_energy;
+}
 void AttachedBodies::refresh(const btSoftBody& body) {
   attached_->get(body).stale = true;
   attached_->get(body).stepped.positions_changed();

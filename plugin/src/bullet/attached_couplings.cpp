@@ -19,7 +19,8 @@ void AttachedBodies::World::wake(const AttachedCoupling& coupling) {
 }
 
 bool AttachedCoupling::holds(const btSoftBody& body) const {
-  return std::any_of(points.begin(), points.end(), [&](const CouplingPoint& point) { return point.soft_body == &body; });
+  return std::any_of(points.begin(), points.end(),
+                     [&](const CouplingPoint& point) { return point.soft_body == &body; });
 }
 
 int AttachedBodies::World::couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time) {
@@ -50,7 +51,8 @@ int AttachedBodies::World::couple(std::vector<CouplingPoint> points, PotentialFi
       if (point.soft_body && points[l].soft_body == point.soft_body && points[l].node == point.node)
         fail("node " + std::to_string(point.node) + " is point " + std::to_string(l) + " already");
   }
-  if (!any_soft) throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
+  if (!any_soft)
+    throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
   auto coupling = std::make_unique<AttachedCoupling>(next_coupling_++, std::move(points), std::move(field));
   coupling->stepped.potential = &coupling->field;
   coupling->stepped.damping_time = damping_time;
@@ -82,8 +84,8 @@ void AttachedBodies::World::wake_coupled() {
     return *point.rigid_body;
   };
   const auto can_sleep = [](const btCollisionObject& object) {
-    return !object.isStaticOrKinematicObject() && (object.getActivationState() == WANTS_DEACTIVATION ||
-                                                   object.getActivationState() == ISLAND_SLEEPING);
+    return !object.isStaticOrKinematicObject() &&
+           (object.getActivationState() == WANTS_DEACTIVATION || object.getActivationState() == ISLAND_SLEEPING);
   };
   const auto is_restless = [&](const btCollisionObject& object) {
     const btRigidBody* body = btRigidBody::upcast(&object);
@@ -126,9 +128,9 @@ void AttachedBodies::World::join_coupled(Real duration, bool gravity_applied) {
                                    [](const CouplingPoint& point) { return point.soft_body; });
     const auto island = island_of(get(*home->soft_body).stepped);
     if (island == islands_.end()) continue;
-    const bool complete = std::all_of(coupling->points.begin(), coupling->points.end(), [&](const CouplingPoint& point) {
-      return !point.soft_body || get(*point.soft_body).body->isActive();
-    });
+    const bool complete = std::all_of(
+        coupling->points.begin(), coupling->points.end(),
+        [&](const CouplingPoint& point) { return !point.soft_body || get(*point.soft_body).body->isActive(); });
     if (!complete) continue;
     for (const CouplingPoint& point : coupling->points) {
       if (point.rigid_body) {

@@ -47,7 +47,8 @@ class Candidates final : public btBroadphaseAabbCallback {
     auto* object = static_cast<btCollisionObject*>(proxy->m_clientObject);
     if (object->getInternalType() == btCollisionObject::CO_SOFT_BODY || !object->hasContactResponse()) return true;
     if (object->getCollisionShape()->isSoftBody()) return true;
-    if (body_.m_collisionDisabledObjects.findLinearSearch(object) != body_.m_collisionDisabledObjects.size()) return true;
+    if (body_.m_collisionDisabledObjects.findLinearSearch(object) != body_.m_collisionDisabledObjects.size())
+      return true;
     if (!object->checkCollideWith(&body_) || !body_.checkCollideWith(object)) return true;
     if (const btBroadphaseProxy* own = body_.getBroadphaseHandle())
       if (!(proxy->m_collisionFilterGroup & own->m_collisionFilterMask) ||
@@ -125,8 +126,8 @@ RigidBody AttachedBodies::World::start_of(const btCollisionObject& object, Real 
   const auto expected = expectations_.find(object.getBroadphaseHandle()->m_uniqueId);
   if (expected != expectations_.end() && expected->second.step == step_count_ - 1) {
     Vector3 other = (start.velocity - expected->second.velocity) / duration;
-    const Real limit = start.acceleration.norm() +
-                       expected->second.impulse.cwiseProduct(start.inverse_mass).norm() / duration;
+    const Real limit =
+        start.acceleration.norm() + expected->second.impulse.cwiseProduct(start.inverse_mass).norm() / duration;
     const Real size = other.norm();
     if (size > limit) other *= limit / size;
     start.acceleration += other;

@@ -20,7 +20,7 @@ struct AttachedBody {
   PotentialField field;
   AttachOptions options;
   SteppedBody stepped;
-  bool stale = true;  // the stability estimate is to be made anew
+  bool stale = true;                    // the stability estimate is to be made anew
   std::uint64_t estimated_version = 0;  // of the field's stiffness
 
   // What was last written to the nodes: only differences to it are read.
@@ -28,9 +28,9 @@ struct AttachedBody {
   std::vector<btScalar> read_inverse_masses;
   int rejected_particle = -1;  // whose node held something that is not finite, and was set back
 
-  void read_nodes();                       // adds what others changed
-  void read_forces();                      // takes the forces of btSoftBody::addForce
-  void remember(int node) {                // the node now says what the particle says
+  void read_nodes();         // adds what others changed
+  void read_forces();        // takes the forces of btSoftBody::addForce
+  void remember(int node) {  // the node now says what the particle says
     written_positions[node] = body->m_nodes[node].m_x;
     written_velocities[node] = body->m_nodes[node].m_v;
   }

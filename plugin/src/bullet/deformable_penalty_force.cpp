@@ -47,10 +47,10 @@ struct DeformablePenaltyForce::Attached {
   }
 };
 
-DeformablePenaltyForce::DeformablePenaltyForce(Real damping_time) : type_(next_force_type()), damping_time_(damping_time) {
+DeformablePenaltyForce::DeformablePenaltyForce(Real damping_time)
+    : type_(next_force_type()), damping_time_(damping_time) {
   if (!(damping_time >= 0) || !std::isfinite(damping_time))
-    throw std::invalid_argument("force: damping_time is " + to_text(damping_time) +
-                                ", must be zero or positive [s]");
+    throw std::invalid_argument("force: damping_time is " + to_text(damping_time) + ", must be zero or positive [s]");
 }
 
 DeformablePenaltyForce::~DeformablePenaltyForce() = default;
@@ -77,7 +77,8 @@ void DeformablePenaltyForce::for_each_active(const Function& function) {
     if (m_softBodies.findLinearSearch(attached->body) == m_softBodies.size() || !attached->body->isActive()) continue;
     if (attached->body->m_nodes.size() != attached->field.num_particles())
       throw std::logic_error("attached soft body has " + std::to_string(attached->body->m_nodes.size()) +
-                             " nodes, had " + std::to_string(attached->field.num_particles()) + " when it was attached");
+                             " nodes, had " + std::to_string(attached->field.num_particles()) +
+                             " when it was attached");
     attached->read_positions();
     attached->out.setZero();
     function(*attached);

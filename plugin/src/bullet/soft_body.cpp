@@ -15,8 +15,7 @@ namespace {
 void check(const Eigen::Matrix3Xd& vertices, const SoftBodyOptions& options) {
   const auto require = [](bool ok, const char* name, Real value, const char* range) {
     if (!ok)
-      throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " +
-                                  range);
+      throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " + range);
   };
   require(options.mass > 0 && std::isfinite(options.mass), "mass", options.mass, "positive and finite [kg]");
   require(options.margin >= 0 && std::isfinite(options.margin), "margin", options.margin, "zero or positive [m]");
@@ -45,8 +44,8 @@ std::vector<Real> node_masses(int num_vertices, const std::vector<std::array<int
   for (std::size_t i = 0; i < masses.size(); ++i) {
     masses[i] *= options.mass / total;
     if (!(masses[i] > 0))
-      throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + to_text(masses[i]) + " kg: no " +
-                                  element + " of the mesh holds it");
+      throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + to_text(masses[i]) +
+                                  " kg: no " + element + " of the mesh holds it");
   }
   return masses;
 }
@@ -93,11 +92,11 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
         throw std::invalid_argument("soft body: triangle " + std::to_string(t) + ": vertex index " +
                                     std::to_string(node) + " is outside the " + std::to_string(num_vertices) +
                                     " vertices");
-  return assemble(world_info, surface.vertices, surface.triangles,
-                  options.stock_deformable ? edges_of(surface.triangles) : std::vector<Edge>{},
-                  node_masses(num_vertices, surface.triangles, areas_of(surface.vertices, surface.triangles), "triangle",
-                              options),
-                  options);
+  return assemble(
+      world_info, surface.vertices, surface.triangles,
+      options.stock_deformable ? edges_of(surface.triangles) : std::vector<Edge>{},
+      node_masses(num_vertices, surface.triangles, areas_of(surface.vertices, surface.triangles), "triangle", options),
+      options);
 }
 
 }  // namespace penalty

@@ -10,8 +10,8 @@ namespace penalty {
 BlockMatrix::BlockMatrix(int num_particles, std::vector<std::pair<int, int>> pattern) {
   for (auto [row, column] : pattern)
     if (row < 0 || column < 0 || row >= num_particles || column >= num_particles)
-      throw std::out_of_range("block matrix: block (" + std::to_string(row) + ", " + std::to_string(column) +
-                              ") of " + std::to_string(num_particles) + " particles");
+      throw std::out_of_range("block matrix: block (" + std::to_string(row) + ", " + std::to_string(column) + ") of " +
+                              std::to_string(num_particles) + " particles");
   for (int i = 0; i < num_particles; ++i) pattern.emplace_back(i, i);
   std::sort(pattern.begin(), pattern.end());
   pattern.erase(std::unique(pattern.begin(), pattern.end()), pattern.end());
@@ -80,7 +80,8 @@ void BlockMatrix::add_product(const Vectors& x, Real scale, Forces y) const {
 Eigen::MatrixXd BlockMatrix::to_dense() const {
   Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(3 * num_particles(), 3 * num_particles());
   for (int row = 0; row < num_particles(); ++row)
-    for (int k = row_begin_[row]; k < row_begin_[row + 1]; ++k) dense.block<3, 3>(3 * row, 3 * columns_[k]) = blocks_[k];
+    for (int k = row_begin_[row]; k < row_begin_[row + 1]; ++k)
+      dense.block<3, 3>(3 * row, 3 * columns_[k]) = blocks_[k];
   return dense;
 }
 

@@ -29,9 +29,11 @@ std::size_t ElementBatch::check(int element) const {
 void ElementBatch::check_stencil(std::span<const int> stencil) const {
   for (std::size_t k = 0; k < stencil.size(); ++k)
     if (stencil[k] < 0 || stencil[k] >= num_particles_)
-      fail(num_elements(), "index " + std::to_string(stencil[k]) + " is outside the " + std::to_string(num_particles_) +
-                               " particles");
-  const auto fail_twice = [this](int index) { fail(num_elements(), "index " + std::to_string(index) + " appears twice"); };
+      fail(num_elements(),
+           "index " + std::to_string(stencil[k]) + " is outside the " + std::to_string(num_particles_) + " particles");
+  const auto fail_twice = [this](int index) {
+    fail(num_elements(), "index " + std::to_string(index) + " appears twice");
+  };
   if (stencil.size() <= 8) {
     for (std::size_t k = 0; k < stencil.size(); ++k)
       for (std::size_t l = 0; l < k; ++l)
@@ -135,7 +137,8 @@ void ElementBatch::set_breaking(const Breaking& breaking) {
 
 void ElementBatch::set_damping_time(int element, Real time) {
   const std::size_t e = check(element);
-  if (!(time >= 0) || !std::isfinite(time)) fail(e, "damping time is " + to_text(time) + " s, must be zero or positive");
+  if (!(time >= 0) || !std::isfinite(time))
+    fail(e, "damping time is " + to_text(time) + " s, must be zero or positive");
   full(damping_times_, num_elements())[e] = time;
 }
 

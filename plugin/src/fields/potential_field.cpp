@@ -11,8 +11,8 @@ PotentialField::PotentialField(const Eigen::Matrix3Xd& rest_positions) : rest_(p
   for (Eigen::Index i = 0; i < rest_positions.cols(); ++i)
     for (int axis = 0; axis < 3; ++axis)
       if (!std::isfinite(rest_positions(axis, i)))
-        throw std::invalid_argument("field: rest position " + std::to_string(i) + ": coordinate " + "xyz"[axis] + " is " +
-                                    to_text(rest_positions(axis, i)));
+        throw std::invalid_argument("field: rest position " + std::to_string(i) + ": coordinate " + "xyz"[axis] +
+                                    " is " + to_text(rest_positions(axis, i)));
 }
 
 Potential& PotentialField::add(std::unique_ptr<Potential> potential) {
@@ -164,12 +164,12 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
               scaled(volumes, material.lame_mu()));
   } else {
     const std::vector<Edge> edges = edges_of(tetrahedra);
-    field.add<Length>(edges, scaled(edge_volume_shares(edges, tetrahedra, volumes),
-                                    material.length_stiffness_density(model)));
+    field.add<Length>(edges,
+                      scaled(edge_volume_shares(edges, tetrahedra, volumes), material.length_stiffness_density(model)));
     if (material.area_stiffness_density(model) > 0) {
       const std::vector<Triangle> faces = faces_of(tetrahedra);
-      field.add<TriangleArea>(faces, scaled(face_volume_shares(faces, tetrahedra, volumes),
-                                            material.area_stiffness_density(model)));
+      field.add<TriangleArea>(
+          faces, scaled(face_volume_shares(faces, tetrahedra, volumes), material.area_stiffness_density(model)));
     }
     // The least Poisson ratio, computed in floating point, may leave a volume term of either sign in the last digits.
     const Real density = material.volume_stiffness_density(model);

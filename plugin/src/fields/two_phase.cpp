@@ -152,9 +152,9 @@ PotentialField make_recovering_field(const Eigen::Matrix3Xd& vertices, std::span
   soft.young = 2 * material.lame_mu();
   soft.poisson = 0;
   PotentialField field(vertices);
-  field.add(std::make_unique<TwoPhase>(
-      tetrahedra, make_elastic_field(vertices, tetrahedra, soft, ElasticModel::neo_hookean),
-      make_elastic_field(vertices, tetrahedra, material, model), thresholds));
+  field.add(std::make_unique<TwoPhase>(tetrahedra,
+                                       make_elastic_field(vertices, tetrahedra, soft, ElasticModel::neo_hookean),
+                                       make_elastic_field(vertices, tetrahedra, material, model), thresholds));
   return field;
 }
 

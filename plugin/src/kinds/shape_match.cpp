@@ -103,7 +103,7 @@ Hessian<dynamic> ShapeMatch::energy_hessian(const Points<dynamic>& p) const {
 }
 
 void ShapeMatch::damping_force(const Points<dynamic>& p, const Points<dynamic>& velocities, Real damping,
-                   Gradient<dynamic>& force) const {
+                               Gradient<dynamic>& force) const {
   const RigidVelocity rigid = best_rigid_velocity(p, velocities, rest_->weights);
   for (Eigen::Index i = 0; i < p.cols(); ++i)
     force.col(i) = -damping * rest_->weights[i] * rest_->scale * (velocities.col(i) - rigid.at(p.col(i)));
@@ -126,7 +126,7 @@ ShapeMatch::PrincipalAxes ShapeMatch::principal_axes(const Points<dynamic>& p) c
 }
 
 void ShapeMatch::damp(const Points<dynamic>& p, std::span<const Real> inverse_masses, Real damping,
-                             Points<dynamic>& velocities) const {
+                      Points<dynamic>& velocities) const {
   const Eigen::Index n = p.cols();
   assert(static_cast<Eigen::Index>(inverse_masses.size()) == n && velocities.cols() == n);
   Real mass = 0;
@@ -149,7 +149,8 @@ void ShapeMatch::damp(const Points<dynamic>& p, std::span<const Real> inverse_ma
     softened[i] = rest_->weights[i] / (1 + damping * rest_->scale * rest_->weights[i] * inverse_masses[i]);
   const RigidVelocity rigid = best_rigid_velocity(p, velocities, softened);
   for (Eigen::Index i = 0; i < n; ++i)
-    velocities.col(i) -= damping * rest_->scale * softened[i] * inverse_masses[i] * (velocities.col(i) - rigid.at(p.col(i)));
+    velocities.col(i) -=
+        damping * rest_->scale * softened[i] * inverse_masses[i] * (velocities.col(i) - rigid.at(p.col(i)));
 }
 
 }  // namespace penalty

@@ -56,9 +56,11 @@ void jitter(PackedVectors& points, std::span<const Real> inverse_masses, Real di
 
 bool unfold(PackedVectors& points, const Positions& rest, const AffineSpan& rest_span,
             std::span<const Real> inverse_masses) {
-  if (rest_span.dimension == 0 || affine_span(points, rest_span.spreads[0]).dimension >= rest_span.dimension) return false;
+  if (rest_span.dimension == 0 || affine_span(points, rest_span.spreads[0]).dimension >= rest_span.dimension)
+    return false;
   const auto count = static_cast<Real>(rest.cols());
-  const Vector3 rest_mean = rest.topRows<3>().rowwise().sum() / count, mean = points.topRows<3>().rowwise().sum() / count;
+  const Vector3 rest_mean = rest.topRows<3>().rowwise().sum() / count,
+                mean = points.topRows<3>().rowwise().sum() / count;
   Matrix3 covariance = Matrix3::Zero();
   for (Eigen::Index i = 0; i < rest.cols(); ++i)
     covariance += (points.col(i).head<3>() - mean) * (rest.col(i).head<3>() - rest_mean).transpose();

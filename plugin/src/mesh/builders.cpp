@@ -91,7 +91,7 @@ TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells, BoxSplit 
   stride[order[0]] = stride[order[1]] * (cells[order[1]] + 1);
 
   TetMesh mesh;
-  std::vector<std::string> arguments{to_text(size.x()),         to_text(size.y()),         to_text(size.z()),
+  std::vector<std::string> arguments{to_text(size.x()),        to_text(size.y()),        to_text(size.z()),
                                      std::to_string(cells[0]), std::to_string(cells[1]), std::to_string(cells[2])};
   if (split == BoxSplit::six) arguments.push_back("six");
   mesh.source = call("make_box", arguments);

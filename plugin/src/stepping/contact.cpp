@@ -5,7 +5,7 @@
 namespace penalty {
 namespace {
 
-constexpr Real depth_decay_time = 0.05;      // [s]
+constexpr Real depth_decay_time = 0.05;          // [s]
 constexpr Real largest_depth_correction = 0.01;  // share of the depth a sweep takes back
 
 Vector3 weighted_sum(const ContactPoint& point, const PackedVectors& vectors) {
@@ -39,8 +39,8 @@ ContactWork solve_contacts(std::span<Contact> contacts, Particles& particles, st
     contact.impulse.setZero();
     Real point_mobility = 0;
     for (int k = 0; k < contact.point.num_particles; ++k)
-      point_mobility += contact.point.weights[k] * contact.point.weights[k] *
-                        particles.inverse_masses[contact.point.particles[k]];
+      point_mobility +=
+          contact.point.weights[k] * contact.point.weights[k] * particles.inverse_masses[contact.point.particles[k]];
     if (point_mobility <= 0) continue;
 
     const Vector3 arm = weighted_sum(contact.point, particles.positions) - body.position;

@@ -14,15 +14,15 @@ Vector3 arm_of(const CoupledPoint& point, std::span<const RigidBody> rigid_bodie
 }
 
 // The points of a coupling where their bodies have them now.
-void gather_positions(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<const RigidBody> rigid_bodies) {
+void gather_positions(Coupling& coupling, std::span<SteppedBody* const> bodies,
+                      std::span<const RigidBody> rigid_bodies) {
   for (std::size_t k = 0; k < coupling.points.size(); ++k) {
     const CoupledPoint& point = coupling.points[k];
     const auto column = static_cast<Eigen::Index>(k);
     if (point.body >= 0)
       coupling.positions.col(column) = bodies[point.body]->particles.positions.col(point.particle);
     else
-      coupling.positions.col(column).head<3>() =
-          rigid_bodies[point.rigid_body].position + arm_of(point, rigid_bodies);
+      coupling.positions.col(column).head<3>() = rigid_bodies[point.rigid_body].position + arm_of(point, rigid_bodies);
   }
 }
 
@@ -43,8 +43,7 @@ Real push(const CoupledPoint& point, const Vector3& impulse, std::span<SteppedBo
   if (!body.is_dynamic()) return 0;
   const Vector3 moment = arm_of(point, rigid_bodies).cross(impulse);
   const Vector3 dv = body.inverse_mass.cwiseProduct(impulse), dw = body.inverse_inertia * moment;
-  const Real work =
-      impulse.dot(body.velocity + dv / 2) + moment.dot(body.angular_velocity + dw / 2);
+  const Real work = impulse.dot(body.velocity + dv / 2) + moment.dot(body.angular_velocity + dw / 2);
   body.velocity += dv;
   body.angular_velocity += dw;
   body.impulse += impulse;
@@ -67,18 +66,21 @@ void gather_velocities(Coupling& coupling, std::span<SteppedBody* const> bodies,
   }
 }
 
-void evaluate_forces(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<const RigidBody> rigid_bodies) {
+void evaluate_forces(Coupling& coupling, std::span<SteppedBody* const> bodies,
+                     std::span<const RigidBody> rigid_bodies) {
   gather_positions(coupling, bodies, rigid_bodies);
   coupling.forces.setZero();
   coupling.elastic_energy = coupling.potential->add_forces(coupling.positions, coupling.forces);
 }
 
-void kick(const Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real time) {
+void kick(const Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies,
+          Real time) {
   for (std::size_t k = 0; k < coupling.points.size(); ++k) {
     const CoupledPoint& point = coupling.points[k];
     const Vector3 impulse = time * coupling.forces.col(static_cast<Eigen::Index>(k)).head<3>();
     push(point, impulse, bodies, rigid_bodies);
-    if (point.body >= 0) bodies[point.body]->step_flows.couplings += kick_work(*bodies[point.body], point.particle, impulse, time);
+    if (point.body >= 0)
+      bodies[point.body]->step_flows.couplings += kick_work(*bodies[point.body], point.particle, impulse, time);
   }
 }
 
@@ -94,10 +96,10 @@ Real dissipate(Coupling& coupling, std::span<SteppedBody* const> bodies, std::sp
   for (std::size_t k = 0; k < coupling.points.size(); ++k) {
     const auto column = static_cast<Eigen::Index>(k);
     if (coupling.inverse_masses[k] > 0)
-      work += push(
-          coupling.points[k],
-          (coupling.velocities - coupling.previous_velocities).col(column).head<3>() / coupling.inverse_masses[k],
-          bodies, rigid_bodies);
+      work +=
+          push(coupling.points[k],
+               (coupling.velocities - coupling.previous_velocities).col(column).head<3>() / coupling.inverse_masses[k],
+               bodies, rigid_bodies);
     else
       driven = driven || !coupling.velocities.col(column).isZero(0);
   }

@@ -8,7 +8,8 @@ namespace penalty {
 void evaluate_forces(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<const RigidBody> rigid_bodies);
 
 /// The velocities of its points, into `coupling.velocities`.
-void gather_velocities(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<const RigidBody> rigid_bodies);
+void gather_velocities(Coupling& coupling, std::span<SteppedBody* const> bodies,
+                       std::span<const RigidBody> rigid_bodies);
 
 /// Gives its impulses for `time` [s] to the bodies. Comes before the other forces of the same kick: the work of each part is
 /// that at the mean of the velocities before and after the whole.
@@ -16,6 +17,7 @@ void kick(const Coupling& coupling, std::span<SteppedBody* const> bodies, std::s
 
 /// The velocities that `Potential::dissipate` makes of the points, as impulses on the bodies. The mobility that it reckons with
 /// is no smaller than the true one, so that energy falls. Returns the work of who drives points that nothing moves.
-Real dissipate(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration);
+Real dissipate(Coupling& coupling, std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies,
+               Real duration);
 
 }  // namespace penalty

@@ -11,11 +11,11 @@ namespace penalty {
 namespace {
 
 constexpr Real infinity = std::numeric_limits<Real>::infinity();
-constexpr int most_blocks = 8;            // of substeps, after each of which there is damping and plastic flow
-constexpr Real retry_growth = 1.5;        // substeps of a repeated step
-constexpr Real substep_memory = 0.8;      // share of the last step's substeps that the next one starts from
-constexpr Real doubtful_growth = 0.2;     // relative growth of energy that is never taken for outside work
-constexpr Real unresponsive = 0.8;        // growth that substeps do not reduce below this share is outside work
+constexpr int most_blocks = 8;         // of substeps, after each of which there is damping and plastic flow
+constexpr Real retry_growth = 1.5;     // substeps of a repeated step
+constexpr Real substep_memory = 0.8;   // share of the last step's substeps that the next one starts from
+constexpr Real doubtful_growth = 0.2;  // relative growth of energy that is never taken for outside work
+constexpr Real unresponsive = 0.8;     // growth that substeps do not reduce below this share is outside work
 
 // v += time * (f / m + g); a pinned particle keeps its velocity.
 void kick(SteppedBody& body, Real time) {
@@ -286,8 +286,8 @@ void advance_explicitly(std::span<SteppedBody* const> bodies, std::span<RigidBod
     attempt.run(substeps);
     const Real end_energy = energy(bodies, rigid_bodies, couplings);
     finite = std::isfinite(end_energy);
-    const Real growth = end_energy - start_energy - attempt.outside_work() -
-                        constant_force_work(bodies, rigid_bodies, rigid_start);
+    const Real growth =
+        end_energy - start_energy - attempt.outside_work() - constant_force_work(bodies, rigid_bodies, rigid_start);
     const Real scale = std::max(start_energy, end_energy);
     if (finite && !(growth > tolerance * scale + noise + contact_noise / attempt.substeps())) break;
     if (finite && growth > unresponsive * last_growth && growth < doubtful_growth * scale) break;

@@ -9,17 +9,17 @@
 namespace penalty {
 namespace {
 
-constexpr int most_substeps = 16;        // of a step whose energy would grow
-constexpr Real growth_noise = 1e-12;     // relative growth of energy that is round-off
-constexpr Real round_off = 1e-12;        // of a sum of forces, relative to the sum of their magnitudes
-constexpr Real round_off2 = 1e-28;       // square of that of positions, relative to the size of the body
+constexpr int most_substeps = 16;     // of a step whose energy would grow
+constexpr Real growth_noise = 1e-12;  // relative growth of energy that is round-off
+constexpr Real round_off = 1e-12;     // of a sum of forces, relative to the sum of their magnitudes
+constexpr Real round_off2 = 1e-28;    // square of that of positions, relative to the size of the body
 
 /// Mass, centre, momenta and inertia of particles that nothing holds.
 struct RigidState {
   Real mass = 0;
   Vector3 center = Vector3::Zero(), momentum = Vector3::Zero();
-  Vector3 spin = Vector3::Zero();      // angular momentum about the centre [kg m²/s]
-  Matrix3 inertia = Matrix3::Zero();   // about the centre [kg m²]
+  Vector3 spin = Vector3::Zero();     // angular momentum about the centre [kg m²/s]
+  Matrix3 inertia = Matrix3::Zero();  // about the centre [kg m²]
 
   explicit RigidState(const Particles& particles, bool is_free = true) {
     if (!is_free) return;
@@ -150,7 +150,8 @@ void ImplicitStep::minimize() {
 
 // What the minimum, and iterations that end before it, take from the momenta of a free body.
 void ImplicitStep::restore_momenta(const RigidState& before) {
-  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();  // of the potential: only what acts from outside leaves any
+  Vector3 force = Vector3::Zero(),
+          torque = Vector3::Zero();  // of the potential: only what acts from outside leaves any
   Real forces = 0, torques = 0;
   for (int i = 0; i < particles_.size(); ++i) {
     const Vector3 f = newton_.forces().col(i).head<3>(), arm = newton_.positions().col(i).head<3>() - before.center;

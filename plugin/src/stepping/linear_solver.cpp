@@ -106,7 +106,8 @@ void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions&
   const int groups = num_groups();
   if (groups == 0) return;
   for (int g = 0; g < groups; ++g) {
-    const std::span<const int> members(group_members_.data() + group_begin_[g], group_members_.data() + group_begin_[g + 1]);
+    const std::span<const int> members(group_members_.data() + group_begin_[g],
+                                       group_members_.data() + group_begin_[g + 1]);
     Vector3 center = Vector3::Zero();
     for (const int i : members) center += x.col(i).head<3>() / static_cast<Real>(members.size());
     Real radius2 = 0;
@@ -167,8 +168,7 @@ void LinearSolver::precondition(const LinearSystem& system, const PackedVectors&
   for (int i = 0; i < num_particles; ++i) {
     const int row = 6 * group_of_[i];
     const Vector3 turn = coarse_vector_.segment<3>(row + 3);
-    z.col(i).head<3>() +=
-        moves_[i] * (coarse_vector_.segment<3>(row) + turn.cross(Vector3(arms_.col(i).head<3>())));
+    z.col(i).head<3>() += moves_[i] * (coarse_vector_.segment<3>(row) + turn.cross(Vector3(arms_.col(i).head<3>())));
   }
 }
 

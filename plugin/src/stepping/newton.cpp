@@ -6,9 +6,9 @@
 namespace penalty {
 namespace {
 
-constexpr Real sufficient = 1e-4;     // share of the predicted fall that a step has to keep (Armijo)
+constexpr Real sufficient = 1e-4;  // share of the predicted fall that a step has to keep (Armijo)
 constexpr int most_backtracks = 30;
-constexpr Real round_off = 1e-13;     // of the terms of Phi: below it the slope decides instead
+constexpr Real round_off = 1e-13;  // of the terms of Phi: below it the slope decides instead
 constexpr Real epsilon = 1e-16;
 
 }  // namespace

@@ -15,7 +15,8 @@ void check(const PotentialField& field, const PackedVectors& positions, const Re
   const auto fail = [](const std::string& what) { throw std::invalid_argument("relax: " + what); };
   const auto check_columns = [&](const PackedVectors& vectors, const std::string& what) {
     if (vectors.cols() != field.num_particles())
-      fail(std::to_string(vectors.cols()) + " " + what + "s for " + std::to_string(field.num_particles()) + " particles");
+      fail(std::to_string(vectors.cols()) + " " + what + "s for " + std::to_string(field.num_particles()) +
+           " particles");
     for (Eigen::Index i = 0; i < vectors.cols(); ++i)
       for (int axis = 0; axis < 3; ++axis)
         if (!std::isfinite(vectors(axis, i)))
@@ -25,8 +26,10 @@ void check(const PotentialField& field, const PackedVectors& positions, const Re
   if (options.loads.size() != 0) check_columns(options.loads, "load");
   for (const int i : options.pinned)
     if (i < 0 || i >= field.num_particles())
-      fail("pinned particle " + std::to_string(i) + " is outside the " + std::to_string(field.num_particles()) + " of the field");
-  if (options.max_iterations < 0) fail("max_iterations is " + std::to_string(options.max_iterations) + ", must be zero or positive");
+      fail("pinned particle " + std::to_string(i) + " is outside the " + std::to_string(field.num_particles()) +
+           " of the field");
+  if (options.max_iterations < 0)
+    fail("max_iterations is " + std::to_string(options.max_iterations) + ", must be zero or positive");
   if (!(options.tolerance > 0)) fail("tolerance is " + to_text(options.tolerance) + ", must be positive");
   if (options.linear.max_iterations < 1)
     fail("linear.max_iterations is " + std::to_string(options.linear.max_iterations) + ", must be at least 1");
@@ -40,11 +43,16 @@ std::string RelaxReport::message() const {
   const std::string numbers = ", energy " + to_text(energy) + " J, largest force " + to_text(residual) + " N";
   const std::string after = " after " + std::to_string(iterations) + " iterations" + numbers;
   switch (end) {
-    case RelaxEnd::converged: return "converged" + after;
-    case RelaxEnd::iteration_limit: return "stopped by the limit" + after;
-    case RelaxEnd::cancelled: return "cancelled" + after;
-    case RelaxEnd::no_descent: return "stopped by round-off" + after;
-    case RelaxEnd::not_finite: return "the potential is not finite at the start";
+    case RelaxEnd::converged:
+      return "converged" + after;
+    case RelaxEnd::iteration_limit:
+      return "stopped by the limit" + after;
+    case RelaxEnd::cancelled:
+      return "cancelled" + after;
+    case RelaxEnd::no_descent:
+      return "stopped by round-off" + after;
+    case RelaxEnd::not_finite:
+      return "the potential is not finite at the start";
   }
   return "";
 }
@@ -103,8 +111,8 @@ RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOp
       report.end = RelaxEnd::no_descent;
       break;
     }
-    if (options.observe && !options.observe({report.iterations, report.energy, report.residual, report.step,
-                                             &newton.positions()})) {
+    if (options.observe &&
+        !options.observe({report.iterations, report.energy, report.residual, report.step, &newton.positions()})) {
       report.end = RelaxEnd::cancelled;
       break;
     }

@@ -20,8 +20,8 @@ Real kinetic_energy(const RigidBody& body) {
   for (int axis = 0; axis < 3; ++axis)
     if (body.inverse_mass[axis] > 0) twice += body.velocity[axis] * body.velocity[axis] / body.inverse_mass[axis];
   if (!body.inverse_inertia.isZero(0))  // angular factors may leave it singular
-    twice += body.angular_velocity.dot(
-        body.inverse_inertia.completeOrthogonalDecomposition().solve(body.angular_velocity));
+    twice +=
+        body.angular_velocity.dot(body.inverse_inertia.completeOrthogonalDecomposition().solve(body.angular_velocity));
   return twice / 2;
 }
 

@@ -61,8 +61,7 @@ Real largest_eigenvalue_bound(const Potential& potential, const Positions& x, st
     Eigen::VectorXd r = apply(q);
     diagonal[k] = q.dot(r);
     // Full orthogonalisation, twice: cheap at this dimension, and Ritz values never come twice.
-    for (int pass = 0; pass < 2; ++pass)
-      r -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * r).eval();
+    for (int pass = 0; pass < 2; ++pass) r -= basis.leftCols(k + 1) * (basis.leftCols(k + 1).transpose() * r).eval();
     off_diagonal[k] = r.norm();
     const bool exhausted = off_diagonal[k] <= 1e-12 * ceiling;
     if (exhausted || k + 1 == dimension || k % 5 == 4) {

@@ -23,8 +23,7 @@ bool steps_implicitly(const SteppedBody& body, Real duration) {
 
 void StepOptions::check() const {
   const auto require = [](bool ok, const char* name, Real value, const char* range) {
-    if (!ok)
-      throw std::invalid_argument(std::string("step: ") + name + " is " + to_text(value) + ", must be " + range);
+    if (!ok) throw std::invalid_argument(std::string("step: ") + name + " is " + to_text(value) + ", must be " + range);
   };
   require(damping_time >= 0 && std::isfinite(damping_time), "damping_time", damping_time, "zero or positive [s]");
   require(drag >= 0 && std::isfinite(drag), "drag", drag, "zero or positive [1/s]");

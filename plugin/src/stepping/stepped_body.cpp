@@ -104,7 +104,8 @@ void estimate_stability(SteppedBody& body, const Positions& rest_positions) {
   body.mass = 0;
   for (const Real inverse_mass : body.particles.inverse_masses) body.mass += inverse_or_zero(inverse_mass);
   const auto points = rest_positions.topRows<3>();
-  const Real extent2 = points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
+  const Real extent2 =
+      points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
   body.rest_positions = rest_positions;
   body.rest_span = affine_span(rest_positions);
   body.energy_noise = 1e-15 * body.mass * body.largest_eigenvalue * extent2;

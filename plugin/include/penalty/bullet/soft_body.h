@@ -12,11 +12,11 @@ struct btSoftBodyWorldInfo;
 namespace penalty {
 
 struct SoftBodyOptions {
-  Real mass = 1;                       // of the whole body [kg]
-  bool equal_masses = true;            // else each node carries its share of the volume or area; equal ones allow larger substeps
-  std::vector<int> pinned = {};          // nodes of zero inverse mass
-  Real margin = 0.02;                  // collision margin [m]
-  Real friction = 0.5;                 // Coulomb coefficient, multiplied with that of the other body
+  Real mass = 1;             // of the whole body [kg]
+  bool equal_masses = true;  // else each node carries its share of the volume or area; equal ones allow larger substeps
+  std::vector<int> pinned = {};  // nodes of zero inverse mass
+  Real margin = 0.02;            // collision margin [m]
+  Real friction = 0.5;           // Coulomb coefficient, multiplied with that of the other body
   /// For Bullet's own solver of the deformable world: its collision flags, and links along the edges, without which Bullet's
   /// trees are never finished. The plugin's solvers need neither.
   bool stock_deformable = false;

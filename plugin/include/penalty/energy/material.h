@@ -38,8 +38,12 @@ struct Material {
   Real lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
 
   /// K per rest volume [J/m³], of the edges, the faces and the tetrahedra.
-  Real length_stiffness_density(ElasticModel model = ElasticModel::springs_volumes) const { return 15 * (1 - share(model)) * lame_mu(); }
-  Real area_stiffness_density(ElasticModel model = ElasticModel::springs_volumes) const { return 15 * share(model) * lame_mu(); }
+  Real length_stiffness_density(ElasticModel model = ElasticModel::springs_volumes) const {
+    return 15 * (1 - share(model)) * lame_mu();
+  }
+  Real area_stiffness_density(ElasticModel model = ElasticModel::springs_volumes) const {
+    return 15 * share(model) * lame_mu();
+  }
   Real volume_stiffness_density(ElasticModel model = ElasticModel::springs_volumes) const {
     return lame_lambda() - (1 + 5 * share(model)) * lame_mu();
   }
@@ -66,9 +70,12 @@ struct Material {
 
   static const char* name_of(ElasticModel model) {
     switch (model) {
-      case ElasticModel::springs_volumes: return "springs and volumes";
-      case ElasticModel::springs_areas_volumes: return "springs, areas and volumes";
-      case ElasticModel::neo_hookean: return "the neo-Hookean model";
+      case ElasticModel::springs_volumes:
+        return "springs and volumes";
+      case ElasticModel::springs_areas_volumes:
+        return "springs, areas and volumes";
+      case ElasticModel::neo_hookean:
+        return "the neo-Hookean model";
     }
     return "";
   }

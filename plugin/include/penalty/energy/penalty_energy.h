@@ -2,8 +2,8 @@
 #pragma once
 #include <vector>
 
-#include "penalty/kinds/kind.h"
 #include "penalty/energy/modifiers.h"
+#include "penalty/kinds/kind.h"
 #include "penalty/math/psd_projection.h"
 
 namespace penalty {
@@ -128,8 +128,9 @@ concept HasDampingModes = ElasticEnergy<Kind> && requires(const Kind kind, const
 /// Or all motion but the rigid one: `damping_force(p, v, d)` of the group, and `damp(p, inverse_masses, d * duration, v)`,
 /// its implicit step.
 template <class Kind>
-concept HasRigidDamping = ElasticEnergy<Kind> && requires(const Kind kind, const Points<Kind::num_points>& p,
-                                                          Points<Kind::num_points>& v, std::vector<Real> inverse_masses) {
+concept HasRigidDamping = ElasticEnergy<Kind> &&
+    requires(const Kind kind, const Points<Kind::num_points>& p, Points<Kind::num_points>& v,
+             std::vector<Real> inverse_masses) {
   { kind.damping_force(p, v, Real()) } -> std::convertible_to<Gradient<Kind::num_points>>;
   kind.damp(p, inverse_masses, Real(), v);
 };

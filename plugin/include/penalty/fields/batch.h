@@ -54,7 +54,8 @@ concept HasSparseHessian = Constraint<Kind> && requires(const Kind k, const Poin
 /// An energy of any number of points whose Hessian is a diagonal and few rank-one terms.
 template <class Kind>
 concept HasDiagonalAndModes = ElasticEnergy<Kind> && requires(const Kind k, const Points<Kind::num_points>& p) {
-  k.visit_stiffness(p, true, [](int, Real) {}, [](Real, const Gradient<Kind::num_points>&) {});
+  k.visit_stiffness(
+      p, true, [](int, Real) {}, [](Real, const Gradient<Kind::num_points>&) {});
 };
 
 /// Elements of one kind, each a stencil of particle indices, a kind and a stiffness K [J], in packed arrays.
@@ -120,8 +121,8 @@ class Batch final : public ElementBatch {
 
  private:
   // The stiffness of an element of many points is not one dense block.
-  static constexpr bool is_structured =
-      num_points == dynamic && (HasSparseHessian<Kind> || HasDiagonalAndModes<Kind> || !(HasHessian<Kind> || ElasticEnergy<Kind>));
+  static constexpr bool is_structured = num_points == dynamic && (HasSparseHessian<Kind> || HasDiagonalAndModes<Kind> ||
+                                                                  !(HasHessian<Kind> || ElasticEnergy<Kind>));
 
   // What the evaluation of one element works in: on the stack where its size is known, else kept with the element.
   struct FixedScratch {
@@ -198,9 +199,8 @@ class Batch final : public ElementBatch {
 template <ElementKind Kind>
 Real Batch<Kind>::energy(const Positions& x) const {
   Real sum = 0;
-  for_each_enabled(x, [&](std::size_t e, auto& s) {
-    sum += penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e));
-  });
+  for_each_enabled(
+      x, [&](std::size_t e, auto& s) { sum += penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)); });
   return sum;
 }
 
@@ -228,9 +228,8 @@ template <ElementKind Kind>
 Real Batch<Kind>::evolve(const Positions& x, Real duration) {
   if (!evolves()) return 0;
   Real taken = 0;
-  for_each_enabled(x, [&](std::size_t e, auto& s) {
-    taken += evolve_element(e, deviation(kinds_[e], s.points), duration);
-  });
+  for_each_enabled(
+      x, [&](std::size_t e, auto& s) { taken += evolve_element(e, deviation(kinds_[e], s.points), duration); });
   return taken;
 }
 
@@ -257,7 +256,8 @@ void Batch<Kind>::append_energies(const Positions& x, std::vector<Real>& energie
 template <ElementKind Kind>
 void Batch<Kind>::add_particle_energies(const Positions& x, std::span<Real> energies) const {
   for_each_enabled(x, [&](std::size_t e, auto& s) {
-    const Real share = penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)) / static_cast<Real>(stencils_[e].size());
+    const Real share =
+        penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e)) / static_cast<Real>(stencils_[e].size());
     for (const int i : stencils_[e]) energies[i] += share;
   });
 }

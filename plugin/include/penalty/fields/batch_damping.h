@@ -33,9 +33,7 @@ void Batch<Kind>::add_damping(const Positions& x, Real time, BlockMatrix& matrix
     if constexpr (HasRigidDamping<Kind>) {
       kinds_[e].visit_damping(
           s.points,
-          [&](int i, Real value) {
-            matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value));
-          },
+          [&](int i, Real value) { matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value)); },
           [](Real, const Gradient<num_points>&) {});
     } else if constexpr (num_points != dynamic) {
       Hessian<num_points> d = Hessian<num_points>::Zero();
@@ -57,7 +55,8 @@ void Batch<Kind>::append_damping_terms(const Positions& x, Real time, std::vecto
         terms.push_back({damping * weight, stencils_[e], mode});
       };
       if constexpr (HasRigidDamping<Kind>)
-        kinds_[e].visit_damping(s.points, [](int, Real) {}, append);
+        kinds_[e].visit_damping(
+            s.points, [](int, Real) {}, append);
       else
         visit_damping_modes(e, s, append);
     });

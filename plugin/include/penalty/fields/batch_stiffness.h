@@ -19,9 +19,8 @@ void Batch<Kind>::visit_structured(std::size_t e, Scratch& s, StiffnessModel mod
     // The Hessian of a constraint of many points is projected as a whole or not at all: psd leaves it out.
     if constexpr (HasSparseHessian<Kind>)
       if (model == StiffnessModel::exact)
-        kind.visit_hessian_blocks(s.points, [&](int i, int j, const Matrix3& block) {
-          visit_block(i, j, k * profile.strain(c) * block);
-        });
+        kind.visit_hessian_blocks(
+            s.points, [&](int i, int j, const Matrix3& block) { visit_block(i, j, k * profile.strain(c) * block); });
   } else {
     const Real psi = kind.energy_and_gradient(s.points, s.gradient);
     const Real c = std::sqrt(2 * std::max<Real>(psi, 0));
@@ -52,8 +51,7 @@ void Batch<Kind>::add_stiffness(const Positions& x, StiffnessModel model, BlockM
       const Hessian<num_points> k = stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e));
       const int n = static_cast<int>(stencil.size());
       for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j)
-          stiffness.add_block(stencil[i], stencil[j], k.template block<3, 3>(3 * i, 3 * j));
+        for (int j = 0; j < n; ++j) stiffness.add_block(stencil[i], stencil[j], k.template block<3, 3>(3 * i, 3 * j));
     }
   });
 }
@@ -74,12 +72,15 @@ void Batch<Kind>::append_pattern(std::vector<std::pair<int, int>>& pattern) cons
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const {
+void Batch<Kind>::append_rank_one_terms(const Positions& x, StiffnessModel model,
+                                        std::vector<RankOneTerm>& terms) const {
   if constexpr (is_structured)
     for_each_enabled(x, [&](std::size_t e, auto& s) {
       visit_structured(
           e, s, model, [](int, int, const Matrix3&) {},
-          [&](Real coefficient, const Gradient<num_points>& mode) { terms.push_back({coefficient, stencils_[e], mode}); });
+          [&](Real coefficient, const Gradient<num_points>& mode) {
+            terms.push_back({coefficient, stencils_[e], mode});
+          });
     });
 }
 

@@ -69,7 +69,7 @@ class BlockMatrix {
   std::vector<int> columns_;    // sorted within a row
   std::vector<int> diagonal_;   // where it is in each row
   std::vector<Matrix3> blocks_;
-  std::vector<int> slots_;      // of the blocks added since `set_zero`, in order
+  std::vector<int> slots_;  // of the blocks added since `set_zero`, in order
   std::size_t cursor_ = 0;
 };
 

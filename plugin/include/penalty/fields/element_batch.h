@@ -88,7 +88,9 @@ class ElementBatch : public Potential {
   std::vector<Real> stiffnesses_;  // in force: 0 of a disabled element [J]
 
  private:
-  Real own_stiffness(std::size_t e) const { return disabled_stiffnesses_.empty() || stiffnesses_[e] > 0 ? stiffnesses_[e] : disabled_stiffnesses_[e]; }
+  Real own_stiffness(std::size_t e) const {
+    return disabled_stiffnesses_.empty() || stiffnesses_[e] > 0 ? stiffnesses_[e] : disabled_stiffnesses_[e];
+  }
   std::vector<Profile>& profiles_to_change();
   void disable(std::size_t e);
 

@@ -7,15 +7,15 @@
 #include <utility>
 #include <vector>
 
-#include "penalty/fields/block_matrix.h"
 #include "penalty/energy/penalty_energy.h"
+#include "penalty/fields/block_matrix.h"
 #include "penalty/math/types.h"
 
 namespace penalty {
 
 /// A part of the stiffness that is too dense for a block matrix: coefficient * d dᵀ, column k of d belongs to particles[k].
 struct RankOneTerm {
-  Real coefficient;             // of either sign
+  Real coefficient;  // of either sign
   std::vector<int> particles;
   Points<dynamic> direction;
 };
@@ -25,9 +25,9 @@ struct RankOneTerm {
 struct LedgerEntry {
   std::string name;
   std::size_t num_elements = 0, num_enabled = 0;
-  Real energy = 0;                             // [J]
-  Real mean_strain = 0, largest_strain = 0;    // of |strain|, over the enabled elements
-  int largest_element = -1;                    // where it is largest
+  Real energy = 0;                           // [J]
+  Real mean_strain = 0, largest_strain = 0;  // of |strain|, over the enabled elements
+  int largest_element = -1;                  // where it is largest
 };
 
 /// A sum of element energies. Calls are virtual once a batch of elements, never per element. Arrays have one column a
@@ -54,7 +54,8 @@ class Potential {
   /// elements of many points couple all of them with each other.
   virtual void add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const = 0;
   virtual void append_pattern(std::vector<std::pair<int, int>>& pattern) const = 0;
-  virtual void append_rank_one_terms(const Positions& x, StiffnessModel model, std::vector<RankOneTerm>& terms) const = 0;
+  virtual void append_rank_one_terms(const Positions& x, StiffnessModel model,
+                                     std::vector<RankOneTerm>& terms) const = 0;
 
   /// df += scale * (d²E/dx²) dx, without a matrix and with nothing left out.
   virtual void add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,

@@ -4,10 +4,10 @@
 #include <optional>
 #include <type_traits>
 
+#include "penalty/energy/material.h"
 #include "penalty/fields/batch.h"
 #include "penalty/fields/topology.h"
 #include "penalty/kinds/gradient_check.h"
-#include "penalty/energy/material.h"
 
 namespace penalty {
 
@@ -32,15 +32,16 @@ class PotentialField final : public Potential {
 
   /// The same with a stiffness of its own for each stencil.
   template <ElementKind Kind>
-  Batch<Kind>& add(std::span<const StencilOf<Kind>> stencils, const std::vector<Real>& stiffnesses, std::string name = {}) {
+  Batch<Kind>& add(std::span<const StencilOf<Kind>> stencils, const std::vector<Real>& stiffnesses,
+                   std::string name = {}) {
     return add_elements<Kind>(stencils, stiffnesses, std::move(name),
                               [](const Points<Kind::num_points>& rest) { return Kind::at_rest(rest); });
   }
 
   /// The same for a kind with parameters: `prototype.at_rest(points)` makes the elements.
   template <ElementKind Kind>
-  Batch<Kind>& add(const Kind& prototype, std::type_identity_t<std::span<const StencilOf<Kind>>> stencils, Real stiffness,
-                   std::string name = {}) {
+  Batch<Kind>& add(const Kind& prototype, std::type_identity_t<std::span<const StencilOf<Kind>>> stencils,
+                   Real stiffness, std::string name = {}) {
     return add(prototype, stencils, std::vector<Real>(stencils.size(), stiffness), std::move(name));
   }
   template <ElementKind Kind>
@@ -122,8 +123,9 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
                                   const Material& material, ElasticModel model = ElasticModel::springs_volumes);
 
 template <ElementKind Kind, class AtRest>
-Batch<Kind>& PotentialField::add_elements(std::span<const StencilOf<Kind>> stencils, const std::vector<Real>& stiffnesses,
-                                          std::string name, const AtRest& at_rest) {
+Batch<Kind>& PotentialField::add_elements(std::span<const StencilOf<Kind>> stencils,
+                                          const std::vector<Real>& stiffnesses, std::string name,
+                                          const AtRest& at_rest) {
   if (name.empty()) name = Kind::name;
   if (stiffnesses.size() != stencils.size())
     throw std::invalid_argument(name + ": " + std::to_string(stiffnesses.size()) + " stiffnesses for " +

@@ -66,7 +66,9 @@ class TwoPhase final : public Potential {
   const PotentialField& active() const { return fields_[soft_active_ ? 0 : 1]; }
   PotentialField& active() { return fields_[soft_active_ ? 0 : 1]; }
   // What the stable step is judged by must hold in both phases.
-  const PotentialField& for_model(StiffnessModel model) const { return model == StiffnessModel::taut ? fields_[1] : active(); }
+  const PotentialField& for_model(StiffnessModel model) const {
+    return model == StiffnessModel::taut ? fields_[1] : active();
+  }
   bool exceeds(const Positions& x, Real limit) const;
   Matrix3 deformation_gradient(std::size_t t, const Positions& x) const;
 

@@ -16,7 +16,8 @@ struct Attachment {
   /// A prototype: `length` [m] is the stretch at which C = 1. Throws std::invalid_argument unless it is positive and finite.
   static Attachment of_length(Real length) {
     if (!(length > 0) || length - length != 0)
-      throw std::invalid_argument(std::string(name) + ": length is " + to_text(length) + ", must be positive and finite");
+      throw std::invalid_argument(std::string(name) + ": length is " + to_text(length) +
+                                  ", must be positive and finite");
     return {1 / length, 0, Eigen::Vector3f::UnitX()};
   }
 

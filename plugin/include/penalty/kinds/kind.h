@@ -28,10 +28,10 @@ concept HasHessian = Constraint<Kind> && requires(const Kind c, const Points<Kin
 
 /// A kind may give value and gradient in one pass, where they share work: the kernel of every step.
 template <class Kind>
-concept HasValueAndGradient =
-    Constraint<Kind> && requires(const Kind c, const Points<Kind::num_points>& p, Gradient<Kind::num_points>& g) {
-      { c.value_and_gradient(p, g) } -> std::same_as<Real>;
-    };
+concept HasValueAndGradient = Constraint<Kind> &&
+    requires(const Kind c, const Points<Kind::num_points>& p, Gradient<Kind::num_points>& g) {
+  { c.value_and_gradient(p, g) } -> std::same_as<Real>;
+};
 
 /// A kind may give the positive semidefinite matrix nearest to dC dCᵀ + strain d²C, where it has a quicker way to it than
 /// the eigenvectors of the Hessian.

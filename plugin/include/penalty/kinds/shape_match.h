@@ -176,8 +176,7 @@ void ShapeMatch::visit_damping(const Points<dynamic>& p, const VisitDiagonal& vi
   for (int k = 0; k < 3; ++k) {
     if (!(principal.moments[k] > 0)) continue;
     const Vector3 axis = principal.axes.col(k);
-    for (int i = 0; i < n; ++i)
-      mode.col(i) = rest.weights[i] * axis.cross(Vector3(p.col(i) - principal.center));
+    for (int i = 0; i < n; ++i) mode.col(i) = rest.weights[i] * axis.cross(Vector3(p.col(i) - principal.center));
     visit_mode(-rest.scale / principal.moments[k], mode);
   }
 }

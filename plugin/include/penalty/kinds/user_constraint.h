@@ -5,8 +5,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "penalty/kinds/kind.h"
 #include "penalty/kinds/gradient_check.h"
+#include "penalty/kinds/kind.h"
 #include "penalty/math/automatic_differentiation.h"
 
 namespace penalty {

@@ -10,7 +10,8 @@ namespace penalty {
 /// been pressed into fewer dimensions than it has at rest may stay there: every force lies in that space.
 struct AffineSpan {
   int dimension = 0;
-  Vector3 spreads = Vector3::Zero();  // root mean square distance from the mean along the principal axes, descending [m]
+  Vector3 spreads =
+      Vector3::Zero();  // root mean square distance from the mean along the principal axes, descending [m]
 };
 
 /// Counts the principal axes along which the points spread by more than 1e-6 of `scale` [m]; 0: of their largest spread.

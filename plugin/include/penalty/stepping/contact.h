@@ -21,11 +21,11 @@ struct ContactPoint {
 /// with a positive `radius`, not closer to `anchor` than that: the surface of a ball.
 struct Contact {
   ContactPoint point;
-  int rigid_body = 0;          // index into the rigid bodies of the island
-  Vector3 anchor, normal;      // in the frame of the rigid body [m], [-]
-  Real friction = 0;           // Coulomb coefficient
-  Real radius = 0;             // of a ball about the anchor; zero: a plane [m]
-  Real depth = 0;              // largest depth below the plane during the step [m], reported
+  int rigid_body = 0;                 // index into the rigid bodies of the island
+  Vector3 anchor, normal;             // in the frame of the rigid body [m], [-]
+  Real friction = 0;                  // Coulomb coefficient
+  Real radius = 0;                    // of a ball about the anchor; zero: a plane [m]
+  Real depth = 0;                     // largest depth below the plane during the step [m], reported
   Vector3 impulse = Vector3::Zero();  // on the point, of the last sweep [N s], reported
 };
 
@@ -41,7 +41,7 @@ struct ContactWork {
 /// never pushes out by velocity. The impulse goes to the particles and, with the opposite sign, to the rigid body at the same
 /// point, so both momenta are kept to round-off; friction is clipped to Coulomb's cone. Depth beyond `slop` [m] against
 /// bodies that cannot move is taken back by position, one per cent a sweep.
-ContactWork solve_contacts(std::span<Contact> contacts, Particles& particles, std::span<RigidBody> rigid_bodies, Real duration,
-                    Real slop);
+ContactWork solve_contacts(std::span<Contact> contacts, Particles& particles, std::span<RigidBody> rigid_bodies,
+                           Real duration, Real slop);
 
 }  // namespace penalty

@@ -56,12 +56,12 @@ class LinearSolver {
   void precondition(const LinearSystem& system, const PackedVectors& r, PackedVectors& z);
   void factorize_coarse(const LinearSystem& system, const Positions& x);
 
-  std::vector<int> group_of_;                   // of each particle
+  std::vector<int> group_of_;  // of each particle
   std::vector<int> group_begin_, group_members_;
   std::vector<Matrix3> inverse_diagonal_;
-  PackedVectors arms_;                          // from the centre of the group, in units of its size
-  std::vector<Real> moves_;                     // 1, of fixed particles 0
-  Eigen::MatrixXd coarse_;                      // its Cholesky factor in the lower triangle
+  PackedVectors arms_;       // from the centre of the group, in units of its size
+  std::vector<Real> moves_;  // 1, of fixed particles 0
+  Eigen::MatrixXd coarse_;   // its Cholesky factor in the lower triangle
   Eigen::VectorXd coarse_scale_, coarse_vector_;
   PackedVectors residual_, preconditioned_, search_, product_;
 };

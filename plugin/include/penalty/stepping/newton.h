@@ -12,12 +12,12 @@ namespace penalty {
 /// has D = damping matrix / h at x0, where the step began. Whatever is empty is left out.
 struct Objective {
   const Potential* potential = nullptr;
-  std::vector<Real> weights;   // w_i [N/m]
-  PackedVectors targets;       // t_i [m]
-  PackedVectors loads;         // f_i [N]
-  PackedVectors damped_from;   // x0 [m]; empty: no damping
-  Real damping_time = 0;       // of the elements, besides their own [s]
-  Real inverse_duration = 0;   // 1 / h [1/s]
+  std::vector<Real> weights;  // w_i [N/m]
+  PackedVectors targets;      // t_i [m]
+  PackedVectors loads;        // f_i [N]
+  PackedVectors damped_from;  // x0 [m]; empty: no damping
+  Real damping_time = 0;      // of the elements, besides their own [s]
+  Real inverse_duration = 0;  // 1 / h [1/s]
 };
 
 /// One iteration, from x to x + length * d.
@@ -35,7 +35,9 @@ class NewtonSolver {
  public:
   /// Makes the pattern of the matrix: once, and after elements were added.
   void set_pattern(const Potential& potential, int num_particles);
-  bool has_pattern_of(const Potential& potential) const { return potential_ == &potential && elements_ == potential.num_elements(); }
+  bool has_pattern_of(const Potential& potential) const {
+    return potential_ == &potential && elements_ == potential.num_elements();
+  }
 
   /// Particles that do not move; to be added in ascending order.
   void clear_fixed() { system_.fixed.clear(); }

@@ -16,8 +16,8 @@ struct Particles {
   int size() const { return static_cast<int>(positions.cols()); }
 };
 
-Real kinetic_energy(const Particles& particles);                                  // [J]
-Vector3 linear_momentum(const Particles& particles);                              // [kg m/s]
+Real kinetic_energy(const Particles& particles);                                         // [J]
+Vector3 linear_momentum(const Particles& particles);                                     // [kg m/s]
 Vector3 angular_momentum(const Particles& particles, const Vector3& about = {0, 0, 0});  // [kg m²/s]
 
 }  // namespace penalty

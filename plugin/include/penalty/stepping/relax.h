@@ -11,9 +11,9 @@ namespace penalty {
 /// Where a relaxation is after an iteration.
 struct RelaxProgress {
   int iteration = 0;
-  Real energy = 0;    // of the potential, less the work of the loads [J]
-  Real residual = 0;  // largest force that is not balanced [N]
-  Real step = 0;      // largest displacement that Newton's method asked for [m]
+  Real energy = 0;                           // of the potential, less the work of the loads [J]
+  Real residual = 0;                         // largest force that is not balanced [N]
+  Real step = 0;                             // largest displacement that Newton's method asked for [m]
   const PackedVectors* positions = nullptr;  // where the particles are [m]; during the call only
 };
 
@@ -23,7 +23,7 @@ struct RelaxOptions {
   Real tolerance = 1e-9;
   LinearOptions linear = {};
   std::vector<int> pinned = {};  // particles that stay where they are
-  PackedVectors loads = {}; // constant forces, column i on particle i [N]; empty: none
+  PackedVectors loads = {};      // constant forces, column i on particle i [N]; empty: none
   /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it, see
   /// penalty::unfold: forces alone may not.
   bool unfold = true;

@@ -15,9 +15,9 @@ struct RigidBody {
   Matrix3 inverse_inertia = Matrix3::Zero();   // world, at `rotation` [1/(kg m²)]
   Vector3 acceleration = Vector3::Zero();      // that acts besides the contacts: gravity, other contacts [m/s²]
 
-  Vector3 impulse = Vector3::Zero();           // of the soft contacts, summed [N s]
-  Vector3 angular_impulse = Vector3::Zero();   // about the centre of mass [N m s]
-  Vector3 turn = Vector3::Zero();              // integral of the angular velocity [rad]
+  Vector3 impulse = Vector3::Zero();          // of the soft contacts, summed [N s]
+  Vector3 angular_impulse = Vector3::Zero();  // about the centre of mass [N m s]
+  Vector3 turn = Vector3::Zero();             // integral of the angular velocity [rad]
 
   bool is_dynamic() const { return !inverse_mass.isZero(0) || !inverse_inertia.isZero(0); }
   Vector3 velocity_at(const Vector3& arm) const { return velocity + angular_velocity.cross(arm); }

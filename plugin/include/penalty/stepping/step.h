@@ -25,18 +25,19 @@ inline constexpr int crossover_substeps = 100;
 /// a little: it repeats steps that gain energy, not those that lose it.)
 struct StepOptions {
   Integrator integrator = Integrator::automatic;
-  Real damping_time = 0;         // ratio of damping to stiffness along the constraint gradients, beta [s]
-  Real drag = 0;                 // rate at which all velocities decay [1/s]; does not keep momentum
-  int substeps = 0;              // in a step; 0: from the stability limit
-  Real safety = 0.99;            // share of the stability limit that a substep may use, in (0, 1]
-  Real contact_safety = 0.7;     // the same while the body is in contact: impacts excite the fastest modes
-  Real energy_tolerance = 0.005; // relative growth of energy in a step above which it is repeated with more substeps
-  int max_substeps = 20000;      // beyond this a step is taken as it is, if it is finite
-  Real contact_slop = 1e-4;      // depth that is left alone [m]
-  int newton_iterations = 8;     // most of an implicit step
-  Real newton_tolerance = 1e-3;  // ends them: what is left of the forces that are not balanced, in the norm of the preconditioner
-  LinearOptions linear = {};     // of each Newton iteration
-  bool unfold = true;            // out of a plane, a line or a point: see penalty::unfold
+  Real damping_time = 0;          // ratio of damping to stiffness along the constraint gradients, beta [s]
+  Real drag = 0;                  // rate at which all velocities decay [1/s]; does not keep momentum
+  int substeps = 0;               // in a step; 0: from the stability limit
+  Real safety = 0.99;             // share of the stability limit that a substep may use, in (0, 1]
+  Real contact_safety = 0.7;      // the same while the body is in contact: impacts excite the fastest modes
+  Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps
+  int max_substeps = 20000;       // beyond this a step is taken as it is, if it is finite
+  Real contact_slop = 1e-4;       // depth that is left alone [m]
+  int newton_iterations = 8;      // most of an implicit step
+  Real newton_tolerance =
+      1e-3;  // ends them: what is left of the forces that are not balanced, in the norm of the preconditioner
+  LinearOptions linear = {};  // of each Newton iteration
+  bool unfold = true;         // out of a plane, a line or a point: see penalty::unfold
 
   /// Throws std::invalid_argument that names the option and its value.
   void check() const;
@@ -45,17 +46,17 @@ struct StepOptions {
 /// What a step did.
 struct StepReport {
   Integrator integrator = Integrator::explicit_step;  // that was used
-  int substeps = 0;               // of the step that was kept
-  int newton_iterations = 0;      // of an implicit step, over its substeps
-  int linear_iterations = 0;      // of conjugate gradients, likewise
-  bool unfolded = false;          // particles were moved out of a plane, a line or a point
-  int retries = 0;                // by the energy guard
-  bool finite = true;             // false: the step was undone, the state is that of its start
-  int first_bad_particle = -1;    // when not finite: the first such particle at the start, else the fastest
-  Real elastic_energy = 0;        // at the end [J]
-  Real kinetic_energy = 0;        // at the end, without rigid bodies [J]
-  Real contact_depth = 0;         // largest depth below a contact plane [m]
-  int num_contacts = 0;           // contacts that were considered
+  int substeps = 0;                                   // of the step that was kept
+  int newton_iterations = 0;                          // of an implicit step, over its substeps
+  int linear_iterations = 0;                          // of conjugate gradients, likewise
+  bool unfolded = false;                              // particles were moved out of a plane, a line or a point
+  int retries = 0;                                    // by the energy guard
+  bool finite = true;                                 // false: the step was undone, the state is that of its start
+  int first_bad_particle = -1;  // when not finite: the first such particle at the start, else the fastest
+  Real elastic_energy = 0;      // at the end [J]
+  Real kinetic_energy = 0;      // at the end, without rigid bodies [J]
+  Real contact_depth = 0;       // largest depth below a contact plane [m]
+  int num_contacts = 0;         // contacts that were considered
 };
 
 /// Energy that a body has received and lost [J]. Elastic and kinetic energy together are what they were at the start plus
@@ -65,12 +66,12 @@ struct EnergyFlows {
   Real contacts = 0;         // work of contacts on the body: rigid bodies give and take, impact and friction take
   Real couplings = 0;        // work of couplings on the body
   Real driving = 0;          // work of whoever moves pinned particles
-  Real changes = 0;          // between steps, by the application and by Bullet: positions, velocities, targets, elements
-  Real damping = 0;          // lost along the constraint gradients
-  Real drag = 0;             // lost to the drag of the step
-  Real inelastic = 0;        // lost to plastic flow and breaking
-  Real integration = 0;      // lost to the numerical damping of implicit steps: what balances their books
-  Real contact_loss = 0;     // lost to impact and friction where the body touches: already in `contacts`
+  Real changes = 0;       // between steps, by the application and by Bullet: positions, velocities, targets, elements
+  Real damping = 0;       // lost along the constraint gradients
+  Real drag = 0;          // lost to the drag of the step
+  Real inelastic = 0;     // lost to plastic flow and breaking
+  Real integration = 0;   // lost to the numerical damping of implicit steps: what balances their books
+  Real contact_loss = 0;  // lost to impact and friction where the body touches: already in `contacts`
 
   Real received() const { return constant_forces + contacts + couplings + driving + changes; }
   Real lost() const { return damping + drag + inelastic + integration; }
@@ -112,23 +113,23 @@ struct SteppedBody {
   PackedVectors forces;  // at `particles.positions`, external ones included [N]
   Real elastic_energy = 0;
   bool forces_valid = false;
-  EnergyFlows step_flows;      // of the attempt at the present step
-  std::optional<Real> last_energy;  // at the end of the last step [J]
-  int last_substeps = 0;       // what the energy guard settled on
-  Real mass = 0;               // of the particles that are not pinned [kg]
-  Real energy_noise = 0;       // growth of energy that means nothing [J]
-  Particles start;             // positions and velocities to go back to
+  EnergyFlows step_flows;              // of the attempt at the present step
+  std::optional<Real> last_energy;     // at the end of the last step [J]
+  int last_substeps = 0;               // what the energy guard settled on
+  Real mass = 0;                       // of the particles that are not pinned [kg]
+  Real energy_noise = 0;               // growth of energy that means nothing [J]
+  Particles start;                     // positions and velocities to go back to
   std::vector<RigidBody> rigid_start;  // likewise for the rigid bodies of its island
-  PackedVectors rest_positions;  // as `estimate_stability` was told [m]
+  PackedVectors rest_positions;        // as `estimate_stability` was told [m]
   AffineSpan rest_span;
   ImplicitState implicit;
 };
 
 /// A point that a coupling holds: a particle of a body of the island, or a point fixed in one of its rigid bodies.
 struct CoupledPoint {
-  int body = -1, particle = -1;     // index into the bodies of the island; -1: of a rigid body
-  int rigid_body = -1;              // index into the rigid bodies of the island
-  Vector3 anchor = Vector3::Zero(); // in the frame of the rigid body [m]
+  int body = -1, particle = -1;      // index into the bodies of the island; -1: of a rigid body
+  int rigid_body = -1;               // index into the rigid bodies of the island
+  Vector3 anchor = Vector3::Zero();  // in the frame of the rigid body [m]
 };
 
 /// A potential over points of several bodies: attachments, joints of flesh and bone. Particle i of the potential is point i;
