@@ -8,6 +8,10 @@ constexpr Real frame = 1.0 / 60;
 
 class Editing : public WorldTest {};
 
+// A field in use is changed, not replaced: the solver keeps what it knows of it.
+static_assert(
+    !std::is_assignable_v<decltype(std::declval<AttachedBodies&>().edit(std::declval<btSoftBody&>())), PotentialField>);
+
 // A kind that is not part of the library, in fifteen lines: the sum of the squared sides of a triangle, relative.
 struct Girth {
   static constexpr std::string_view name = "girth";

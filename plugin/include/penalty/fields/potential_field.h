@@ -18,6 +18,10 @@ class PotentialField final : public Potential {
   /// `rest_positions` is 3 x P [m]. Throws std::invalid_argument, naming particle and value, if one is not finite.
   explicit PotentialField(const Eigen::Matrix3Xd& rest_positions);
 
+  /// A field goes to whoever owns it by construction; one that is in use is changed, never assigned to.
+  PotentialField(PotentialField&&) = default;
+  PotentialField& operator=(PotentialField&&) = delete;
+
   int num_particles() const { return static_cast<int>(rest_.cols()); }
   const PackedVectors& rest_positions() const { return rest_; }
 
