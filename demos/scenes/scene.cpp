@@ -1,18 +1,12 @@
 #include "scenes/scene.h"
 
-#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
-#include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
-#include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
-#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
-#include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
 #include <stdexcept>
 
-#include "penalty/bullet/penalty_deformable_body_solver.h"
-#include "penalty/bullet/penalty_soft_body_solver.h"
 #include "penalty/bullet/soft_body.h"
+#include "scenes/bullet_world.h"
 
 namespace penalty::demo {
 namespace {
@@ -43,55 +37,6 @@ std::unique_ptr<btConvexInternalShape> make_shape(const RigidObject& object) {
   return std::make_unique<btBoxShape>(to_bullet(std::get<Block>(object.shape).half_extents));
 }
 
-/// Either world of Bullet with the plugin's solver in it. Members are destroyed from the last to the first: the world
-/// goes before the solvers it points to.
-class World {
- public:
-  explicit World(WorldKind kind) : dispatcher_(&configuration_) {
-    if (kind == WorldKind::classic) {
-      auto solver = std::make_unique<PenaltySoftBodySolver>();
-      auto world = std::make_unique<btSoftRigidDynamicsWorld>(&dispatcher_, &broadphase_, &classic_constraints_,
-                                                              &configuration_, solver.get());
-      world_info_ = &world->getWorldInfo();
-      classic_ = world.get();
-      attached_ = solver.get();
-      classic_solver_ = std::move(solver);
-      world_ = std::move(world);
-    } else {
-      auto solver = std::make_unique<PenaltyDeformableBodySolver>();
-      deformable_constraints_.setDeformableSolver(solver.get());
-      auto world = std::make_unique<btDeformableMultiBodyDynamicsWorld>(
-          &dispatcher_, &broadphase_, &deformable_constraints_, &configuration_, solver.get());
-      world_info_ = &world->getWorldInfo();
-      deformable_ = world.get();
-      attached_ = solver.get();
-      deformable_solver_ = std::move(solver);
-      world_ = std::move(world);
-    }
-  }
-
-  void add(btSoftBody* body) { classic_ ? classic_->addSoftBody(body) : deformable_->addSoftBody(body); }
-  void remove(btSoftBody* body) { classic_ ? classic_->removeSoftBody(body) : deformable_->removeSoftBody(body); }
-
-  btDiscreteDynamicsWorld& world() { return *world_; }
-  btSoftBodyWorldInfo& info() { return *world_info_; }
-  AttachedBodies& attached() { return *attached_; }
-
- private:
-  btSoftBodyRigidBodyCollisionConfiguration configuration_;
-  btCollisionDispatcher dispatcher_;
-  btDbvtBroadphase broadphase_;
-  btSequentialImpulseConstraintSolver classic_constraints_;
-  btDeformableMultiBodyConstraintSolver deformable_constraints_;
-  std::unique_ptr<PenaltySoftBodySolver> classic_solver_;
-  std::unique_ptr<PenaltyDeformableBodySolver> deformable_solver_;
-  std::unique_ptr<btDiscreteDynamicsWorld> world_;
-  btSoftRigidDynamicsWorld* classic_ = nullptr;
-  btDeformableMultiBodyDynamicsWorld* deformable_ = nullptr;
-  AttachedBodies* attached_ = nullptr;
-  btSoftBodyWorldInfo* world_info_ = nullptr;
-};
-
 constexpr Real ground_half_width = 50, ground_half_height = 1;  // [m]
 
 }  // namespace
@@ -100,7 +45,7 @@ std::string_view bullet_precision() { return sizeof(btScalar) == sizeof(float) ?
 
 struct Scene::Impl {
   SceneSetup setup;
-  World world;
+  BulletWorld world;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the objects, then the ground
   std::unique_ptr<btSoftBody> body;
@@ -115,10 +60,9 @@ struct Scene::Impl {
     info.air_density = 0;
     info.water_density = 0;
     info.m_maxDisplacement = 1e6;
-    info.m_gravity = to_bullet(setup.gravity);
     info.m_sparsesdf.Initialize();
     info.m_sparsesdf.setDefaultVoxelsz(static_cast<btScalar>(voxel_size()));
-    world.world().setGravity(to_bullet(setup.gravity));
+    world.set_gravity(to_bullet(setup.gravity));
 
     for (const RigidObject& object : setup.objects) add_rigid(object);
     if (setup.ground)
@@ -129,7 +73,7 @@ struct Scene::Impl {
 
   ~Impl() {
     world.attached().detach(*body);
-    world.remove(body.get());
+    world.remove(*body);
     for (const auto& rigid : rigid_bodies) world.world().removeRigidBody(rigid.get());
   }
 
@@ -173,7 +117,7 @@ struct Scene::Impl {
     for (int i = 0; i < body->m_nodes.size(); ++i) body->m_nodes[i].m_v = to_bullet(setup.velocities.col(i));
     // What is measured does not fall asleep, unless sleep is what the scene shows.
     body->forceActivationState(setup.sleeps ? ACTIVE_TAG : DISABLE_DEACTIVATION);
-    world.add(body.get());
+    world.add(*body);
     AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
     contact_points = attach.contact_points;
     if (contact_points.empty())
@@ -192,7 +136,7 @@ struct Scene::Impl {
     }
   }
 
-  const Particles& particles() const { return const_cast<World&>(world).attached().particles(*body); }
+  const Particles& particles() const { return const_cast<BulletWorld&>(world).attached().particles(*body); }
 
   Real mean_tip_height(const Positions& x) const {
     Real sum = 0;
@@ -214,7 +158,7 @@ void Scene::step(Real duration) {
   for (std::size_t b = 0; b < scene.setup.objects.size(); ++b)
     if (const auto& path = scene.setup.objects[b].path)
       scene.rigid_bodies[b]->setWorldTransform(to_bullet(path(scene.time)));  // Bullet makes a velocity of the way
-  scene.world.world().stepSimulation(static_cast<btScalar>(duration), 0);
+  scene.world.step(duration);
   if (is_asleep()) scene.time_asleep += duration;
   if (was_asleep && !is_asleep()) ++scene.wakings;
   if (scene.setup.watch) scene.setup.watch(particles().positions, field(), scene.time);

@@ -2,17 +2,13 @@
 // springs and Neo-Hookean forces on the same mesh. The argument is the number of cells across.
 #include <BulletSoftBody/btDeformableGravityForce.h>
 #include <BulletSoftBody/btDeformableMassSpringForce.h>
-#include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
-#include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
 #include <BulletSoftBody/btDeformableNeoHookeanForce.h>
 #include <BulletSoftBody/btSoftBodyHelpers.h>
-#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
-#include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <benchmark/benchmark.h>
-#include <btBulletDynamicsCommon.h>
 
 #include "penalty/bullet_penalty.h"
 #include "reference_beam.h"
+#include "scenes/bullet_world.h"
 
 namespace {
 
@@ -34,65 +30,41 @@ std::unique_ptr<btSoftBody> beam_body(btSoftBodyWorldInfo& info, const TetMesh& 
   return body;
 }
 
-void classic(benchmark::State& state) {
-  const TetMesh mesh = make_beam(static_cast<int>(state.range(0)));
-  btSoftBodyRigidBodyCollisionConfiguration configuration;
-  btCollisionDispatcher dispatcher(&configuration);
-  btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver constraints;
-  PenaltySoftBodySolver solver;
-  btSoftRigidDynamicsWorld world(&dispatcher, &broadphase, &constraints, &configuration, &solver);
-  const auto body = beam_body(world.getWorldInfo(), mesh);
-  world.addSoftBody(body.get());
-  solver.attach(*body, reference_beam_field(mesh, static_cast<int>(state.range(0))), {.step = {.drag = 0.1}});
-  for (auto _ : state) world.stepSimulation(btScalar(1) / 60, 0);
-  state.counters["substeps"] = solver.report(*body).substeps;
-  world.removeSoftBody(body.get());
+void step_beam(benchmark::State& state, demo::WorldKind kind) {
+  const int cells = static_cast<int>(state.range(0));
+  const TetMesh mesh = make_beam(cells);
+  demo::BulletWorld world(kind);
+  const auto body = beam_body(world.info(), mesh);
+  world.add(*body);
+  world.attached().attach(*body, reference_beam_field(mesh, cells), {.step = {.drag = 0.1}});
+  for (auto _ : state) world.step(1.0 / 60);
+  state.counters["substeps"] = world.attached().report(*body).substeps;
+  world.remove(*body);
 }
 
-void deformable(benchmark::State& state) {
-  const TetMesh mesh = make_beam(static_cast<int>(state.range(0)));
-  btSoftBodyRigidBodyCollisionConfiguration configuration;
-  btCollisionDispatcher dispatcher(&configuration);
-  btDbvtBroadphase broadphase;
-  PenaltyDeformableBodySolver solver;
-  btDeformableMultiBodyConstraintSolver constraints;
-  constraints.setDeformableSolver(&solver);
-  btDeformableMultiBodyDynamicsWorld world(&dispatcher, &broadphase, &constraints, &configuration, &solver);
-  const auto body = beam_body(world.getWorldInfo(), mesh);
-  world.addSoftBody(body.get());
-  solver.attach(*body, reference_beam_field(mesh, static_cast<int>(state.range(0))), {.step = {.drag = 0.1}});
-  for (auto _ : state) world.stepSimulation(btScalar(1) / 60, 0);
-  state.counters["substeps"] = solver.report(*body).substeps;
-  world.removeSoftBody(body.get());
-}
+void classic(benchmark::State& state) { step_beam(state, demo::WorldKind::classic); }
+void deformable(benchmark::State& state) { step_beam(state, demo::WorldKind::deformable); }
 
 // Bullet's stock implicit solver with one of its own forces on links or tetrahedra of the same mesh.
 void stock(benchmark::State& state, btDeformableLagrangianForce& force, bool with_tetrahedra) {
   const int cells = static_cast<int>(state.range(0));
   const TetMesh mesh = make_beam(cells);
-  btSoftBodyRigidBodyCollisionConfiguration configuration;
-  btCollisionDispatcher dispatcher(&configuration);
-  btDbvtBroadphase broadphase;
-  btDeformableBodySolver solver;
-  btDeformableMultiBodyConstraintSolver constraints;
-  constraints.setDeformableSolver(&solver);
-  btDeformableMultiBodyDynamicsWorld world(&dispatcher, &broadphase, &constraints, &configuration, &solver);
-  world.setImplicit(true);
-  world.setUseProjection(true);
-  const auto body = beam_body(world.getWorldInfo(), mesh);
+  demo::BulletWorld world(demo::WorldKind::deformable, demo::SoftSolver::bullet);
+  world.deformable().setImplicit(true);
+  world.deformable().setUseProjection(true);
+  const auto body = beam_body(world.info(), mesh);
   if (with_tetrahedra) {
     for (const auto& [a, b, c, d] : mesh.tetrahedra) body->appendTetra(a, b, c, d);
     body->initializeDmInverse();
     body->m_tetraScratches.resizeNoInitialize(body->m_tetras.size());
     body->m_tetraScratchesTn.resizeNoInitialize(body->m_tetras.size());
   }
-  world.addSoftBody(body.get());
+  world.add(*body);
   btDeformableGravityForce weight(gravity);
-  world.addForce(body.get(), &weight);
-  world.addForce(body.get(), &force);
-  for (auto _ : state) world.stepSimulation(btScalar(1) / 60, 0);
-  world.removeSoftBody(body.get());
+  world.deformable().addForce(body.get(), &weight);
+  world.deformable().addForce(body.get(), &force);
+  for (auto _ : state) world.step(1.0 / 60);
+  world.remove(*body);
 }
 
 void stock_mass_spring(benchmark::State& state) {

@@ -1,15 +1,8 @@
 #include "bullet/simulation.h"
 
-#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
-#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
-#include <BulletSoftBody/btDefaultSoftBodySolver.h>
-#include <BulletSoftBody/btDeformableMultiBodyConstraintSolver.h>
-#include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
-
 #include <algorithm>
 
-#include "penalty/bullet/penalty_deformable_body_solver.h"
-#include "penalty/bullet/penalty_soft_body_solver.h"
+void penalty::demo::PrintTo(WorldKind kind, std::ostream* out) { *out << testing::world_name(kind); }
 
 namespace penalty::testing {
 
@@ -17,36 +10,7 @@ std::string world_name(WorldKind kind) {
   return std::string(kind == WorldKind::classic ? "classic" : "deformable") + (double_bullet ? "_float64" : "_float");
 }
 
-struct Simulation::Parts {
-  btSoftBodyRigidBodyCollisionConfiguration configuration;
-  btCollisionDispatcher dispatcher{&configuration};
-  btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver rigid_solver;
-  btDeformableMultiBodyConstraintSolver multi_body_solver;
-  std::unique_ptr<btSoftBodySolver> soft_solver;
-};
-
-Simulation::Simulation(WorldKind kind, Solver solver) : parts_(std::make_unique<Parts>()), kind_(kind) {
-  const auto keep = [&]<class SoftSolver>(std::unique_ptr<SoftSolver> made) {
-    SoftSolver* pointer = made.get();
-    if constexpr (std::is_base_of_v<AttachedBodies, SoftSolver>) penalty_ = pointer;
-    parts_->soft_solver = std::move(made);
-    return pointer;
-  };
-  Parts& p = *parts_;
-  if (kind == WorldKind::classic) {
-    btSoftBodySolver* soft = solver == Solver::penalty
-                                 ? static_cast<btSoftBodySolver*>(keep(std::make_unique<PenaltySoftBodySolver>()))
-                                 : keep(std::make_unique<btDefaultSoftBodySolver>());
-    world_ = std::make_unique<btSoftRigidDynamicsWorld>(&p.dispatcher, &p.broadphase, &p.rigid_solver, &p.configuration,
-                                                        soft);
-  } else {
-    btDeformableBodySolver* soft = solver == Solver::penalty ? keep(std::make_unique<PenaltyDeformableBodySolver>())
-                                                             : keep(std::make_unique<btDeformableBodySolver>());
-    p.multi_body_solver.setDeformableSolver(soft);
-    world_ = std::make_unique<btDeformableMultiBodyDynamicsWorld>(&p.dispatcher, &p.broadphase, &p.multi_body_solver,
-                                                                  &p.configuration, soft);
-  }
+Simulation::Simulation(WorldKind kind, Solver solver) : world_(kind, solver) {
   info().m_maxDisplacement = 1000;
   info().m_sparsesdf.setDefaultVoxelsz(static_cast<btScalar>(0.05));
   set_gravity({0, 0, 0});
@@ -57,33 +21,16 @@ Simulation::~Simulation() {
   while (!rigid_bodies_.empty()) remove(*rigid_bodies_.back());
 }
 
-btDeformableMultiBodyDynamicsWorld& Simulation::deformable_world() {
-  return dynamic_cast<btDeformableMultiBodyDynamicsWorld&>(*world_);
-}
-
-btSoftBodyWorldInfo& Simulation::info() {
-  return kind_ == WorldKind::classic ? dynamic_cast<btSoftRigidDynamicsWorld&>(*world_).getWorldInfo()
-                                     : deformable_world().getWorldInfo();
-}
-
-void Simulation::set_gravity(const Vector3& gravity) {
-  world_->setGravity(to_bullet(gravity));
-  info().m_gravity = to_bullet(gravity);
-}
-
 btSoftBody& Simulation::add(std::unique_ptr<btSoftBody> body) {
   body->setActivationState(DISABLE_DEACTIVATION);
-  if (kind_ == WorldKind::classic)
-    dynamic_cast<btSoftRigidDynamicsWorld&>(*world_).addSoftBody(body.get());
-  else
-    deformable_world().addSoftBody(body.get());
+  world_.add(*body);
   soft_bodies_.push_back(std::move(body));
   return *soft_bodies_.back();
 }
 
 btSoftBody& Simulation::add_jelly(const TetMesh& mesh, const JellyOptions& options) {
   btSoftBody& body = add(make_soft_body(info(), moved(mesh, options.shift), options.body));
-  penalty_->attach(body, make_elastic_field(mesh.vertices, mesh.tetrahedra, options.stiffness), options.attach);
+  penalty().attach(body, make_elastic_field(mesh.vertices, mesh.tetrahedra, options.stiffness), options.attach);
   return body;
 }
 
@@ -100,7 +47,7 @@ btRigidBody& Simulation::add_rigid(std::unique_ptr<btCollisionShape> shape, Real
                                                   static_cast<btScalar>(q.z()), static_cast<btScalar>(q.w())});
   auto body = std::make_unique<btRigidBody>(construction);
   body->setActivationState(DISABLE_DEACTIVATION);
-  world_->addRigidBody(body.get());
+  world().addRigidBody(body.get());
   shapes_.push_back(std::move(shape));
   rigid_bodies_.push_back(std::move(body));
   return *rigid_bodies_.back();
@@ -118,10 +65,7 @@ btRigidBody& Simulation::add_ground(Real friction) {
 }
 
 std::unique_ptr<btSoftBody> Simulation::take_out(btSoftBody& body) {
-  if (kind_ == WorldKind::classic)
-    dynamic_cast<btSoftRigidDynamicsWorld&>(*world_).removeSoftBody(&body);
-  else
-    deformable_world().removeSoftBody(&body);
+  world_.remove(body);
   const auto found =
       std::find_if(soft_bodies_.begin(), soft_bodies_.end(), [&](const auto& b) { return b.get() == &body; });
   std::unique_ptr<btSoftBody> taken = std::move(*found);
@@ -130,28 +74,28 @@ std::unique_ptr<btSoftBody> Simulation::take_out(btSoftBody& body) {
 }
 
 void Simulation::remove(btSoftBody& body) {
-  if (penalty_) penalty_->detach(body);
+  if (world_.has_plugin()) penalty().detach(body);
   take_out(body);
 }
 
 void Simulation::remove(btRigidBody& body) {
-  world_->removeRigidBody(&body);
+  world().removeRigidBody(&body);
   std::erase_if(rigid_bodies_, [&](const auto& b) { return b.get() == &body; });
 }
 
 void Simulation::step(Real duration, int count) {
-  for (int k = 0; k < count; ++k) world_->stepSimulation(static_cast<btScalar>(duration), 0);
+  for (int k = 0; k < count; ++k) world_.step(duration);
 }
 
-Totals Simulation::totals() const {
+Totals Simulation::totals() {
   Totals sum;
-  const Vector3 gravity = to_vector(world_->getGravity());
+  const Vector3 gravity = to_vector(world().getGravity());
   for (const auto& body : soft_bodies_) {
-    if (!penalty_ || !penalty_->is_attached(*body)) continue;
-    const Particles& particles = penalty_->particles(*body);
+    if (!world_.has_plugin() || !penalty().is_attached(*body)) continue;
+    const Particles& particles = penalty().particles(*body);
     sum.momentum += linear_momentum(particles);
     sum.angular_momentum += angular_momentum(particles);
-    sum.energy += kinetic_energy(particles) + penalty_->field(*body).energy(particles.positions);
+    sum.energy += kinetic_energy(particles) + penalty().field(*body).energy(particles.positions);
     for (int i = 0; i < particles.size(); ++i)
       if (particles.inverse_masses[i] > 0)
         sum.energy -= gravity.dot(particles.positions.col(i).head<3>()) / particles.inverse_masses[i];

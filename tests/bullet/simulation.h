@@ -4,9 +4,7 @@
 
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
-#include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
 #include <BulletSoftBody/btSoftBody.h>
-#include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -17,11 +15,18 @@
 #include "penalty/bullet/attached_bodies.h"
 #include "penalty/bullet/soft_body.h"
 #include "penalty/mesh/builders.h"
+#include "scenes/bullet_world.h"
+
+namespace penalty::demo {
+
+void PrintTo(WorldKind kind, std::ostream* out);
+
+}  // namespace penalty::demo
 
 namespace penalty::testing {
 
-enum class WorldKind { classic, deformable };
-enum class Solver { penalty, bullet };
+using demo::WorldKind;
+using Solver = demo::SoftSolver;
 
 inline constexpr bool double_bullet = sizeof(btScalar) == sizeof(double);
 
@@ -29,7 +34,6 @@ inline constexpr bool double_bullet = sizeof(btScalar) == sizeof(double);
 inline Real limit(Real in_double, Real in_float) { return double_bullet ? in_double : in_float; }
 
 std::string world_name(WorldKind kind);  // "classic_float64"
-inline void PrintTo(WorldKind kind, std::ostream* out) { *out << world_name(kind); }
 
 /// A soft body made of a mesh, at rest where it starts.
 struct JellyOptions {
@@ -52,11 +56,11 @@ class Simulation {
   explicit Simulation(WorldKind kind, Solver solver = Solver::penalty);
   ~Simulation();
 
-  btDiscreteDynamicsWorld& world() { return *world_; }
-  btDeformableMultiBodyDynamicsWorld& deformable_world();
-  btSoftBodyWorldInfo& info();
-  AttachedBodies& penalty() { return *penalty_; }
-  void set_gravity(const Vector3& gravity);
+  btDiscreteDynamicsWorld& world() { return world_.world(); }
+  btDeformableMultiBodyDynamicsWorld& deformable_world() { return world_.deformable(); }
+  btSoftBodyWorldInfo& info() { return world_.info(); }
+  AttachedBodies& penalty() { return world_.attached(); }
+  void set_gravity(const Vector3& gravity) { world_.set_gravity(to_bullet(gravity)); }
 
   btSoftBody& add(std::unique_ptr<btSoftBody> body);
   btSoftBody& add_jelly(const TetMesh& mesh, const JellyOptions& options = {});
@@ -73,14 +77,10 @@ class Simulation {
   /// World steps without Bullet's own substeps.
   void step(Real duration, int count = 1);
 
-  Totals totals() const;
+  Totals totals();
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
-  std::unique_ptr<btDiscreteDynamicsWorld> world_;
-  WorldKind kind_;
-  AttachedBodies* penalty_ = nullptr;
+  demo::BulletWorld world_;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btSoftBody>> soft_bodies_;
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies_;
