@@ -76,6 +76,50 @@ TEST_P(NotFinite, OtherNodesGoOnMeanwhile) {
   EXPECT_EQ(sim.penalty().particles(*body).positions, other.penalty().particles(reference).positions);
 }
 
+TEST_P(NotFinite, AnInverseMassIsSetBack) {
+  for (const btScalar bad : {nan, infinite, btScalar(-1)}) {
+    body->m_nodes[7].m_im = bad;
+    expect_recovery(7);
+    EXPECT_GT(body->m_nodes[7].m_im, 0);
+  }
+}
+
+TEST_P(NotFinite, AMassOfTheWholeIsSetBackAndMended) {
+  body->setTotalMass(nan);
+  expect_recovery(0);
+  body->setTotalMass(2);
+  sim.step(frame, 10);
+  Real mass = 0;
+  for (const Real inverse : sim.penalty().particles(*body).inverse_masses) mass += 1 / inverse;
+  EXPECT_NEAR(mass, 2, 1e-5);
+}
+
+// Bullet makes the masses of nodes inside zero, and their inverses infinite.
+TEST_P(NotFinite, AMassOnTheFacesAloneIsSetBackInside) {
+  body->setTotalMass(1, true);
+  sim.step(frame);
+  EXPECT_FALSE(sim.penalty().report(*body).finite);
+  sim.step(frame, 60);
+  EXPECT_TRUE(sim.penalty().report(*body).finite);
+  EXPECT_TRUE(nodes_are_finite());
+  EXPECT_GT(lowest(*body), 0);
+}
+
+TEST_P(NotFinite, TheProblemIsNamed) {
+  const auto problem_of = [&](btScalar& number) {
+    number = nan;
+    sim.step(frame);
+    return sim.penalty().report(*body).problem;
+  };
+  const std::string end = " is not finite, and was set back";
+  EXPECT_EQ(problem_of(body->m_nodes[17].m_x[1]), "node 17: its position" + end);
+  EXPECT_EQ(problem_of(body->m_nodes[3].m_v[0]), "node 3: its velocity" + end);
+  EXPECT_EQ(problem_of(body->m_nodes[4].m_f[0]), "node 4: its force" + end);
+  EXPECT_EQ(problem_of(body->m_nodes[4].m_im), "node 4: its inverse mass is negative or not finite, and was set back");
+  sim.step(frame);
+  EXPECT_EQ(sim.penalty().report(*body).problem, "");
+}
+
 TEST_P(NotFinite, SynchronizeSetsBackToo) {
   body->m_nodes[17].m_x.setY(nan);
   sim.penalty().synchronize(*body);
@@ -120,6 +164,26 @@ TEST_P(Refused, AFieldForAnotherNumberOfParticles) {
   EXPECT_EQ(refusal([&] { sim.penalty().attach(body, PotentialField(Eigen::Matrix3Xd::Zero(3, 5))); }),
             "attach: the field has 5 particles, the soft body 13 nodes");
   EXPECT_FALSE(sim.penalty().is_attached(body));
+}
+
+TEST_P(Refused, NodesThatAreNoNumbers) {
+  const auto attaching = [&](const auto& spoil) {
+    btSoftBody& body = add_ball();
+    spoil(body.m_nodes[3]);
+    const std::string what = refusal([&] { sim.penalty().attach(body, field()); });
+    EXPECT_FALSE(sim.penalty().is_attached(body));
+    sim.remove(body);
+    return what;
+  };
+  using Node = btSoftBody::Node;
+  EXPECT_EQ(attaching([](Node& node) { node.m_x.setY(nan); }), "attach: node 3: position y is nan, must be finite");
+  EXPECT_EQ(attaching([](Node& node) { node.m_x.setX(-infinite); }),
+            "attach: node 3: position x is -inf, must be finite");
+  EXPECT_EQ(attaching([](Node& node) { node.m_v.setZ(nan); }), "attach: node 3: velocity z is nan, must be finite");
+  const std::string range = ", must be zero (pinned) or positive and finite";
+  EXPECT_EQ(attaching([](Node& node) { node.m_im = nan; }), "attach: node 3: inverse mass is nan" + range);
+  EXPECT_EQ(attaching([](Node& node) { node.m_im = infinite; }), "attach: node 3: inverse mass is inf" + range);
+  EXPECT_EQ(attaching([](Node& node) { node.m_im = -2; }), "attach: node 3: inverse mass is -2" + range);
 }
 
 TEST_P(Refused, AWorldInfoWithoutBroadphase) {

@@ -147,8 +147,9 @@ TEST_P(SleepingTied, UncouplingWakesWhatHungOnIt) {
   tie(true);
   ASSERT_TRUE(fall_asleep());
   sim.penalty().uncouple(ropes[1]);
+  sim.step(frame);
   EXPECT_TRUE(bodies[1]->isActive() && bodies[2]->isActive());
-  EXPECT_FALSE(bodies[0]->isActive());
+  EXPECT_TRUE(bodies[0]->isActive()) << "still hangs on the second";
 }
 
 TEST_P(SleepingTied, ABodyThatIsSwitchedOffIsNoError) {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "convert.h"
+#include "identity.h"
 #include "penalty/math/text.h"
 
 namespace penalty {
@@ -23,13 +24,23 @@ btDeformableLagrangianForceType next_force_type() {
 }  // namespace
 
 struct DeformablePenaltyForce::Attached {
-  btSoftBody* body;
+  btSoftBody* body;  // followed only while it is among those of the force
+  Identity name;
   PotentialField field;
+  std::string problem;
   PackedVectors positions, in, out;  // scratch, one column a node
 
   Attached(btSoftBody& soft_body, PotentialField potential_field)
-      : body(&soft_body), field(std::move(potential_field)) {
+      : body(&soft_body), name(Identity::of(soft_body)), field(std::move(potential_field)) {
     positions = in = out = PackedVectors::Zero(4, field.num_particles());
+  }
+
+  void set_problem(const char* what) noexcept {
+    try {
+      problem = what;
+    } catch (const std::bad_alloc&) {
+      problem = "out of memory";  // short enough to need none
+    }
   }
 
   void read_positions() {
@@ -59,12 +70,23 @@ void DeformablePenaltyForce::attach(btSoftBody& body, PotentialField field) {
   if (field.num_particles() != body.m_nodes.size())
     throw std::invalid_argument("attach: the field has " + std::to_string(field.num_particles()) +
                                 " particles, the soft body " + std::to_string(body.m_nodes.size()) + " nodes");
-  for (const auto& attached : attached_)
-    if (attached->body == &body) {
-      attached->field.add(std::make_unique<PotentialField>(std::move(field)));
-      return;
-    }
+  if (Attached* attached = find(body)) {
+    attached->field.add(std::make_unique<PotentialField>(std::move(field)));
+    return;
+  }
+  detach(body);  // whoever was at this address
   attached_.push_back(std::make_unique<Attached>(body, std::move(field)));
+}
+
+DeformablePenaltyForce::Attached* DeformablePenaltyForce::find(const btSoftBody& body) const {
+  for (const auto& attached : attached_)
+    if (attached->name.is(body)) return attached.get();
+  return nullptr;
+}
+
+std::string DeformablePenaltyForce::problem(const btSoftBody& body) const {
+  if (const Attached* attached = find(body)) return attached->problem;
+  throw std::invalid_argument("soft body is not attached");
 }
 
 void DeformablePenaltyForce::detach(const btSoftBody& body) {
@@ -72,16 +94,23 @@ void DeformablePenaltyForce::detach(const btSoftBody& body) {
 }
 
 template <class Function>
-void DeformablePenaltyForce::for_each_active(const Function& function) {
+void DeformablePenaltyForce::for_each_active(const Function& function) noexcept {
   for (const auto& attached : attached_) {
-    if (m_softBodies.findLinearSearch(attached->body) == m_softBodies.size() || !attached->body->isActive()) continue;
-    if (attached->body->m_nodes.size() != attached->field.num_particles())
-      throw std::logic_error("attached soft body has " + std::to_string(attached->body->m_nodes.size()) +
-                             " nodes, had " + std::to_string(attached->field.num_particles()) +
-                             " when it was attached");
-    attached->read_positions();
-    attached->out.setZero();
-    function(*attached);
+    if (m_softBodies.findLinearSearch(attached->body) == m_softBodies.size()) continue;  // perhaps gone
+    const btSoftBody& body = *attached->body;
+    if (!attached->name.is(body) || !body.isActive()) continue;
+    try {
+      if (body.m_nodes.size() != attached->field.num_particles())
+        throw std::logic_error("the soft body has " + std::to_string(body.m_nodes.size()) + " nodes, had " +
+                               std::to_string(attached->field.num_particles()) + " when it was attached");
+      attached->read_positions();
+      attached->out.setZero();
+      function(*attached);
+    } catch (const std::exception& error) {
+      attached->set_problem(error.what());
+    } catch (...) {
+      attached->set_problem("something was thrown that is no std::exception");
+    }
   }
 }
 
@@ -92,6 +121,7 @@ void DeformablePenaltyForce::addScaledForces(btScalar scale, TVStack& force) {
 
 void DeformablePenaltyForce::addScaledExplicitForce(btScalar scale, TVStack& force) {
   for_each_active([&](Attached& a) {
+    a.problem.clear();
     a.field.add_forces(a.positions, a.out);
     a.add_to(force, scale);
   });

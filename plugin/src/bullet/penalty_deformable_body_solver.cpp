@@ -1,9 +1,9 @@
 #include "penalty/bullet/penalty_deformable_body_solver.h"
 
 #include <algorithm>
+#include <cmath>
 
-#include "attached_world.h"
-#include "convert.h"
+#include "world_step.h"
 
 namespace penalty {
 namespace {
@@ -25,39 +25,42 @@ PenaltyDeformableBodySolver::~PenaltyDeformableBodySolver() = default;
 
 bool PenaltyDeformableBodySolver::all_attached() const {
   for (int k = 0; k < m_softBodies.size(); ++k)
-    if (!attached_->find(*m_softBodies[k])) return false;
+    if (!is_attached(*m_softBodies[k])) return false;
   return true;
 }
 
-void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
-  const std::span<btSoftBody* const> bodies(m_softBodies.size() ? &m_softBodies[0] : nullptr, m_softBodies.size());
-  const auto stepped = attached_->step(bodies, time_step, true);
-  for (AttachedBody* attached : stepped) update_constants(*attached->body);
-  // Bullet's prediction is for its own bodies; what it does to ours is overwritten below.
-  if (!all_attached()) btDeformableBodySolver::predictMotion(time_step);
+// Bullet's prediction goes over all that are awake; what makes a body be held, it would spread.
+void PenaltyDeformableBodySolver::predict_others(btScalar time_step) {
+  const auto for_each_held = [this](const auto& call) {
+    for (btSoftBody* body : listed(m_softBodies))
+      if (HeldBody* held = attached_->bodies->find(*body); held && held->outcome == StepOutcome::held) call(*held);
+  };
+  for_each_held([](HeldBody& held) {
+    held.activation_state = held.body->getActivationState();
+    held.body->forceActivationState(ISLAND_SLEEPING);
+  });
+  btDeformableBodySolver::predictMotion(time_step);
+  for_each_held([](HeldBody& held) { held.body->forceActivationState(held.activation_state); });
+}
 
-  for (AttachedBody* attached : stepped) {
-    btSoftBody& body = *attached->body;
-    Particles& particles = attached->stepped.particles;
+void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
+  const std::span<btSoftBody* const> bodies = listed(m_softBodies);
+  const auto stepped = attached_->step(bodies, time_step, true);
+  for (HeldBody* held : stepped) update_constants(*held->body);
+  // What Bullet's prediction does to ours is overwritten below.
+  if (!all_attached()) predict_others(time_step);
+
+  for (HeldBody* held : stepped) {
+    btSoftBody& body = *held->body;
+    Particles& particles = held->stepped.particles;
     if (body.m_cfg.drag > 0) particles.velocities *= 1 - Real(body.m_cfg.drag);
-    const PackedVectors& start = attached->stepped.start.positions;
-    for (int i = 0; i < particles.size(); ++i) {
-      btSoftBody::Node& node = body.m_nodes[i];
-      node.m_x = attached->written_positions[i];
-      node.m_v = to_bullet(Vector3((particles.positions.col(i) - start.col(i)).head<3>() / Real(time_step)));
-      node.m_effectiveMass_inv = btMatrix3x3::getIdentity() * node.m_im;
-    }
-    body.m_nodeRigidContacts.resizeNoInitialize(0);
-    body.m_faceRigidContacts.resizeNoInitialize(0);
-    body.m_faceNodeContacts.resizeNoInitialize(0);
-    body.m_faceNodeContactsCCD.resizeNoInitialize(0);
+    if (!stays_in_range(*held)) continue;
+    held->nodes.write_mean_velocities(particles, held->stepped.start.positions, time_step, Vector3::Zero());
+    held->nodes.forget_contacts();
     predictDeformableMotion(&body, time_step);
-    for (int i = 0; i < particles.size(); ++i) {
-      btSoftBody::Node& node = body.m_nodes[i];
-      node.m_vn = node.m_v;  // in implicit mode Bullet's solve starts from here
-      attached->written_velocities[i] = node.m_v;
-    }
+    held->nodes.remember_velocities();
   }
+  attached_->freeze_held(bodies);
 }
 
 void PenaltyDeformableBodySolver::solveDeformableConstraints(btScalar time_step) {
@@ -68,37 +71,27 @@ void PenaltyDeformableBodySolver::solveDeformableConstraints(btScalar time_step)
 }
 
 void PenaltyDeformableBodySolver::applyTransforms(btScalar time_step) {
-  if (!all_attached()) btDeformableBodySolver::applyTransforms(time_step);
-  for (int k = 0; k < m_softBodies.size(); ++k) {
-    btSoftBody& body = *m_softBodies[k];
-    AttachedBody* attached = attached_->find(body);
-    if (!attached || !body.isActive()) continue;
-    Particles& particles = attached->stepped.particles;
-    bool moved = false;
-    for (int i = 0; i < particles.size(); ++i) {
-      btSoftBody::Node& node = body.m_nodes[i];
+  const std::span<btSoftBody* const> bodies = listed(m_softBodies);
+  attached_->freeze_held(bodies);  // again: Bullet moves all by their velocities, whatever its contacts made of these
+  if (!all_attached() && std::isfinite(time_step)) btDeformableBodySolver::applyTransforms(time_step);
+  attached_->thaw_held(bodies);
+  for (btSoftBody* body : bodies) {
+    HeldBody* held = attached_->bodies->find(*body);
+    if (!held || !body->isActive()) continue;
+    if (held->outcome != StepOutcome::held) {
       // The mean velocity was written, so a change of it is what contacts between soft bodies did.
-      const Vector3 dv = to_vector(node.m_v - attached->written_velocities[i]);
-      const Vector3 shift = time_step * (dv + to_vector(node.m_splitv));
-      if (!shift.isZero(0)) {
-        particles.velocities.col(i).head<3>() += dv;
-        particles.positions.col(i).head<3>() += shift;
-        moved = true;
-      }
-      node.m_x = to_bullet(particles.positions.col(i));
-      node.m_v = to_bullet(particles.velocities.col(i));
-      node.m_q = node.m_x;
-      node.m_vn = node.m_v;
-      attached->remember(i);
+      if (held->nodes.read_velocity_changes(held->stepped.particles, time_step)) held->stepped.positions_changed();
+      report_rejected(*held);
+      stays_in_range(*held);
+      held->nodes.write(held->stepped.particles);
     }
-    if (moved) attached->stepped.positions_changed();
-    body.interpolateRenderMesh();
+    body->interpolateRenderMesh();
   }
   attached_->correct_rigid_bodies(time_step);
 }
 
 void PenaltyDeformableBodySolver::processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) {
-  if (!attached_->find(*body)) btDeformableBodySolver::processCollision(body, object);
+  if (!is_attached(*body)) btDeformableBodySolver::processCollision(body, object);
 }
 
 }  // namespace penalty

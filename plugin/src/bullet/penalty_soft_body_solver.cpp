@@ -1,7 +1,7 @@
 #include "penalty/bullet/penalty_soft_body_solver.h"
 
-#include "attached_world.h"
 #include "convert.h"
+#include "world_step.h"
 
 namespace penalty {
 namespace {
@@ -26,56 +26,45 @@ PenaltySoftBodySolver::PenaltySoftBodySolver() = default;
 PenaltySoftBodySolver::~PenaltySoftBodySolver() = default;
 
 void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
-  const std::span<btSoftBody* const> bodies(m_softBodySet.size() ? &m_softBodySet[0] : nullptr, m_softBodySet.size());
+  const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
   for (btSoftBody* body : bodies)
-    if (!attached_->find(*body) && body->isActive()) body->predictMotion(time_step);
+    if (!is_attached(*body) && body->isActive()) body->predictMotion(time_step);
 
-  for (AttachedBody* attached : attached_->step(bodies, time_step, false)) {
-    btSoftBody& body = *attached->body;
-    Particles& particles = attached->stepped.particles;
+  for (HeldBody* held : attached_->step(bodies, time_step, false)) {
+    btSoftBody& body = *held->body;
+    Particles& particles = held->stepped.particles;
     if (body.m_cfg.kDP > 0) particles.velocities *= 1 - Real(body.m_cfg.kDP);
+    if (!stays_in_range(*held)) continue;
     // Bullet's prediction keeps its bounds and trees, which are to follow the mean velocity; gravity it adds itself.
-    const PackedVectors& start = attached->stepped.start.positions;
     const Vector3 gravity_dv = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_cfg.timescale * time_step);
-    for (int i = 0; i < particles.size(); ++i) {
-      const Vector3 mean = (particles.positions.col(i) - start.col(i)).head<3>() / Real(time_step);
-      btSoftBody::Node& node = body.m_nodes[i];
-      node.m_v = to_bullet(Vector3(node.m_im > 0 ? mean - gravity_dv : mean));
-    }
+    held->nodes.write_mean_velocities(particles, held->stepped.start.positions, time_step, gravity_dv);
     body.predictMotion(time_step);
     // A start position from which the end velocity leads to the end position: whatever Bullet's position constraints then do
     // arrives as a change of that velocity.
-    for (int i = 0; i < particles.size(); ++i) {
-      btSoftBody::Node& node = body.m_nodes[i];
-      node.m_x = to_bullet(particles.positions.col(i));
-      node.m_v = to_bullet(particles.velocities.col(i));
-      node.m_q = node.m_x - node.m_v * body.m_sst.sdt;
-      attached->remember(i);
-    }
+    held->nodes.write(particles, body.m_sst.sdt);
   }
+  attached_->freeze_held(bodies);
 }
 
 void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
-  for (int k = 0; k < m_softBodySet.size(); ++k) {
-    btSoftBody& body = *m_softBodySet[k];
-    if (!body.isActive()) continue;
-    AttachedBody* attached = attached_->find(body);
-    if (!attached) {
-      body.solveConstraints();
-    } else if (has_position_constraints(body)) {
-      solve_position_constraints(body);
-      for (int i = 0; i < body.m_nodes.size(); ++i) {
-        btSoftBody::Node& node = body.m_nodes[i];
-        node.m_v = attached->written_velocities[i] + (node.m_x - attached->written_positions[i]) * body.m_sst.isdt;
-      }
-      attached->read_nodes();
+  const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
+  for (btSoftBody* body : bodies) {
+    if (!body->isActive()) continue;
+    HeldBody* held = attached_->bodies->find(*body);
+    if (!held) {
+      body->solveConstraints();
+    } else if (held->outcome != StepOutcome::held && has_position_constraints(*body)) {
+      solve_position_constraints(*body);
+      held->nodes.positions_to_velocities(body->m_sst.isdt);
+      attached_->read_solved(*held);
     }
   }
+  attached_->thaw_held(bodies);
   attached_->correct_rigid_bodies(time_step);
 }
 
 void PenaltySoftBodySolver::processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) {
-  if (!attached_->find(*body)) btDefaultSoftBodySolver::processCollision(body, object);
+  if (!is_attached(*body)) btDefaultSoftBodySolver::processCollision(body, object);
 }
 
 void PenaltySoftBodySolver::processCollision(btSoftBody* body, btSoftBody* other) {

@@ -1,5 +1,6 @@
 // The soft bodies that the plugin steps, and their way through a Bullet world.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -10,6 +11,8 @@ class btRigidBody;
 class btSoftBody;
 
 namespace penalty {
+
+class HeldBodies;
 
 struct AttachOptions {
   StepOptions step;
@@ -28,12 +31,39 @@ struct CouplingPoint {
   static CouplingPoint on(btRigidBody& body, const Vector3& anchor) { return {.rigid_body = &body, .anchor = anchor}; }
 };
 
+/// The name of an attached body: a value to keep or to drop, which changes nothing for the body. It stays good when body and
+/// solver are deleted, in whatever order.
+class AttachedBody {
+ public:
+  AttachedBody(const std::shared_ptr<const HeldBodies>& solver, const btSoftBody& body, std::uintptr_t serial_number)
+      : bodies_(solver), address_(&body), serial_number_(serial_number) {}
+
+  /// Carried by this body and no other, whatever memory it lies in.
+  std::uintptr_t serial_number() const { return serial_number_; }
+
+  /// Whether the solver steps the body no more. After `detach` at once, after deletion or removal from the world from the
+  /// next world step on; a body that is put back is there again.
+  bool is_gone() const;
+
+ private:
+  std::weak_ptr<const HeldBodies> bodies_;
+  const btSoftBody* address_;  // compared, never followed
+  std::uintptr_t serial_number_;
+};
+
 /// What both solvers of the plugin offer: soft bodies, each with a potential field, stepped inside the world step.
 ///
 /// The double-precision state kept here is authoritative. Of the Bullet nodes only the *difference* to what was last
 /// written is read, so that a change by the application (a node moved, a velocity set, a force added through
 /// btSoftBody::addForce, pinning through setMass) takes effect, and a world in single precision still carries a
 /// simulation in double.
+///
+/// A body is known by a serial number that it carries, not by its address: it may be deleted, or removed from the world,
+/// without `detach`, and so may bodies that are coupled. What remains of it here is never followed.
+///
+/// A step never throws. A body that cannot be stepped stays where it is, and StepReport::problem says why: nodes were
+/// appended, a rigid body that it is coupled to has left the world, a constraint of the user threw, a setting or the
+/// time step is not finite. The rest of the world goes on, and so does the body once that is mended.
 class AttachedBodies {
  public:
   AttachedBodies();
@@ -43,10 +73,13 @@ class AttachedBodies {
 
   /// Takes over a soft body that is, or will be, in the world of this solver. A further field for the same body is added to the
   /// first, options then being those of the last call. Throws std::invalid_argument if the field has another number of
-  /// particles than the body has nodes, if a number is out of range, or if the body's world info has no broadphase.
-  void attach(btSoftBody& body, PotentialField field, const AttachOptions& options = {});
+  /// particles than the body has nodes, if a node's position, velocity or inverse mass is out of range, if another number
+  /// is, or if the body's world info has no broadphase. The result may be dropped.
+  AttachedBody attach(btSoftBody& body, PotentialField field, const AttachOptions& options = {});
 
-  /// Gives the body back to Bullet. Call before the body is deleted; detaching a body that is not attached does nothing.
+  /// Gives the body back to Bullet, and lets those that it is coupled to wake in the next step. Detaching a body that is not
+  /// attached does nothing. A deleted body need not be detached; its memory here is given back when another body stands at its
+  /// address, or with the solver.
   void detach(const btSoftBody& body);
 
   bool is_attached(const btSoftBody& body) const;
@@ -75,10 +108,11 @@ class AttachedBodies {
   /// appears twice, no soft body at all, or another number of points than the field has particles.
   int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time = 0);
 
-  /// Removes a coupling; call before one of its rigid bodies leaves the world. Detaching a soft body does it by itself.
+  /// Removes a coupling; its bodies wake in the next step. Detaching a soft body does it by itself. While a rigid body of the
+  /// coupling is not in the world, its soft bodies cannot be stepped; while a soft one is not, the coupling rests.
   void uncouple(int coupling);
   const PotentialField& coupling_field(int coupling) const;
-  PotentialField& edit_coupling(int coupling);  // wakes its bodies
+  PotentialField& edit_coupling(int coupling);  // its bodies wake in the next step
   Real coupling_energy(int coupling) const;     // at the end of the last step [J]
 
   /// The substep count is estimated anew at the next step: call after a change of masses or of the field.
@@ -88,7 +122,7 @@ class AttachedBodies {
   void synchronize(const btSoftBody& body);
 
  protected:
-  class World;  // the step of both worlds, behind the header
+  class World;  // the step of both worlds
   std::unique_ptr<World> attached_;
 };
 

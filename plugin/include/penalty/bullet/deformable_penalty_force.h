@@ -3,6 +3,8 @@
 #include <BulletSoftBody/btDeformableLagrangianForce.h>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "penalty/fields/potential_field.h"
 
@@ -19,7 +21,9 @@ namespace penalty {
 /// Gauss-Newton's. Contact of a stiff body stays as unstable as under Bullet's own forces, and momentum is not
 /// exchanged exactly with rigid bodies, and nothing flows or breaks: PenaltyDeformableBodySolver has none of these limits. Every object has a force type of
 /// its own, so Bullet never merges two of them. The world does not own the force: remove the
-/// bodies from the world before the force goes.
+/// bodies from the world before the force goes. A deleted body need not be detached.
+///
+/// What Bullet calls never throws: on a body of which forces cannot be had, none acts, and `problem` says why.
 class DeformablePenaltyForce final : public btDeformableLagrangianForce {
  public:
   /// `damping_time`: ratio of damping to stiffness along the constraint gradients [s]. Throws std::invalid_argument if it is
@@ -30,6 +34,10 @@ class DeformablePenaltyForce final : public btDeformableLagrangianForce {
   /// Throws std::invalid_argument if the field has another number of particles than the body has nodes.
   void attach(btSoftBody& body, PotentialField field);
   void detach(const btSoftBody& body);
+
+  /// What kept forces from the body in the last step, on one line; empty: nothing. Throws std::invalid_argument for a body that
+  /// is not attached.
+  std::string problem(const btSoftBody& body) const;
 
   // Forces of all attached bodies that were also added through world.addForce, at the trial positions m_q. Arrays are indexed
   // by Node::index and may be longer than the number of nodes.
@@ -47,8 +55,9 @@ class DeformablePenaltyForce final : public btDeformableLagrangianForce {
 
  private:
   struct Attached;
+  Attached* find(const btSoftBody& body) const;
   template <class Function>
-  void for_each_active(const Function& function);
+  void for_each_active(const Function& function) noexcept;
 
   btDeformableLagrangianForceType type_;
   Real damping_time_;

@@ -32,6 +32,7 @@ class PenaltyDeformableBodySolver : public btDeformableBodySolver, public Attach
 
  private:
   bool all_attached() const;
+  void predict_others(btScalar time_step);
 };
 
 }  // namespace penalty

@@ -2,6 +2,7 @@
 #pragma once
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "penalty/fields/potential.h"
@@ -57,6 +58,8 @@ struct StepReport {
   Real kinetic_energy = 0;      // at the end, without rigid bodies [J]
   Real contact_depth = 0;       // largest depth below a contact plane [m]
   int num_contacts = 0;         // contacts that were considered
+  std::string problem =
+      {};  // what is wrong, on one line; empty: nothing. The body stays where it is until it is mended
 };
 
 /// Energy that a body has received and lost [J]. Elastic and kinetic energy together are what they were at the start plus

@@ -1,0 +1,90 @@
+#include "held_bodies.h"
+
+#include <stdexcept>
+
+namespace penalty {
+
+HeldBody::HeldBody(btSoftBody& soft_body, PotentialField potential_field, const AttachOptions& attach_options)
+    : body(&soft_body),
+      serial(give_serial(soft_body)),
+      field(std::move(potential_field)),
+      options(attach_options),
+      nodes(soft_body, stepped.particles) {
+  stepped.potential = &field;
+  stepped.options = options.step;
+  start = stepped.particles.positions;
+}
+
+void HeldBody::read_nodes() {
+  const NodeChanges changes = nodes.read(stepped.particles);
+  if (changes.moved) {
+    start = stepped.particles.positions;
+    stepped.positions_changed();
+  }
+  stale = stale || changes.lighter;  // heavier particles only leave the estimate too high
+}
+
+void HeldBody::hold(const char* problem, bool stopped) noexcept {
+  outcome = StepOutcome::held;
+  StepReport& report = stepped.report;
+  const Real elastic_energy = report.elastic_energy;
+  report = {};
+  report.elastic_energy = elastic_energy;
+  try {
+    report.problem = problem;
+  } catch (const std::bad_alloc&) {
+    report.problem = "out of memory";  // short enough to need none
+  }
+  stepped.particles.positions = start;
+  if (stopped) {
+    stepped.particles.velocities.setZero();
+    nodes.stop();
+  } else {
+    report.kinetic_energy = kinetic_energy(stepped.particles);
+  }
+  stepped.positions_changed();
+  body->setDeactivationTime(0);  // stays awake, to recover
+}
+
+HeldBody* HeldBodies::find(const btSoftBody& body) const {
+  const auto found = bodies_.find(&body);
+  return found != bodies_.end() && found->second->serial == serial_of(body) ? found->second.get() : nullptr;
+}
+
+HeldBody& HeldBodies::get(const btSoftBody& body) const {
+  if (HeldBody* held = find(body)) return *held;
+  throw std::invalid_argument("soft body is not attached");
+}
+
+HeldBody* HeldBodies::find(const Identity& name) const {
+  const auto found = bodies_.find(name.address);
+  return found != bodies_.end() && found->second->serial == name.serial ? found->second.get() : nullptr;
+}
+
+HeldBody& HeldBodies::add(btSoftBody& body, PotentialField field, const AttachOptions& options) {
+  auto held = std::make_unique<HeldBody>(body, std::move(field), options);
+  return *(bodies_[&body] = std::move(held));  // in the place of one that is gone
+}
+
+void HeldBodies::list(std::span<btSoftBody* const> bodies) {
+  ++step_;
+  for (btSoftBody* body : bodies) {
+    const auto found = bodies_.find(body);
+    if (found == bodies_.end()) continue;
+    if (found->second->serial != serial_of(*body)) {
+      bodies_.erase(found);
+      continue;
+    }
+    HeldBody& held = *found->second;
+    held.listed = step_;
+    held.outcome = StepOutcome::none;
+    held.start = held.stepped.particles.positions;
+  }
+}
+
+bool HeldBodies::is_there(const Identity& name) const {
+  const HeldBody* held = find(name);
+  return held && (held->listed == 0 || is_listed(*held));
+}
+
+}  // namespace penalty

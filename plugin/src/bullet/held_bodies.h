@@ -1,0 +1,76 @@
+// The soft bodies of one solver, known by their serial numbers.
+#pragma once
+#include <memory>
+#include <span>
+#include <string>
+#include <unordered_map>
+
+#include "identity.h"
+#include "nodes.h"
+#include "penalty/bullet/attached_bodies.h"
+
+namespace penalty {
+
+/// What a step made of a body.
+enum class StepOutcome {
+  none,     // not in the world, asleep, or no step was made
+  stepped,  // as it should be
+  held,     // it stays where it is, and the report says why
+};
+
+struct HeldBody {
+  HeldBody(btSoftBody& soft_body, PotentialField potential_field, const AttachOptions& attach_options);
+
+  btSoftBody* body;  // to be followed only where it is known to be alive: given by the caller, or listed by the world
+  SerialNumber serial;
+  PotentialField field;
+  AttachOptions options;
+  SteppedBody stepped;
+  Nodes nodes;
+  bool stale = true;                    // the stability estimate is to be made anew
+  std::uint64_t estimated_version = 0;  // of the field's stiffness
+  int listed = 0;                       // step in which the world last had the body; 0: none so far
+
+  // Of this step.
+  StepOutcome outcome = StepOutcome::none;
+  int activation_state = 0;        // to be restored
+  bool friction_is_finite = true;  // of what it touches
+  PackedVectors start;             // positions before the step, to go back to [m]
+
+  Identity identity() const { return {body, serial}; }
+
+  /// Adds what others changed to the state.
+  void read_nodes();
+
+  /// The step failed: the body stays where it was at the start, and `problem` goes into the report. `stopped`: at rest; else it
+  /// keeps its velocities. Never throws.
+  void hold(const char* problem, bool stopped) noexcept;
+};
+
+/// Bodies by address; an address whose serial number is not the one that was noted belongs to somebody else.
+class HeldBodies {
+ public:
+  /// Null if the body, which is alive, is not attached.
+  HeldBody* find(const btSoftBody& body) const;
+  HeldBody& get(const btSoftBody& body) const;  // throws std::invalid_argument
+
+  /// Null if nobody of that name is held; a body that was deleted unnoticed may still be.
+  HeldBody* find(const Identity& name) const;
+
+  HeldBody& add(btSoftBody& body, PotentialField field, const AttachOptions& options);
+  void remove(const btSoftBody& body) { bodies_.erase(&body); }
+
+  /// Begins a step: notes which bodies are in the world, and drops the entries at whose address a listed body is another.
+  void list(std::span<btSoftBody* const> bodies);
+
+  bool is_listed(const HeldBody& held) const { return held.listed == step_; }
+
+  /// Whether the body is held, and in the world as of the last step or not yet there.
+  bool is_there(const Identity& name) const;
+
+ private:
+  std::unordered_map<const btCollisionObject*, std::unique_ptr<HeldBody>> bodies_;
+  int step_ = 0;
+};
+
+}  // namespace penalty

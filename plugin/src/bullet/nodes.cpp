@@ -1,0 +1,218 @@
+#include "nodes.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "convert.h"
+#include "penalty/math/text.h"
+
+namespace penalty {
+namespace {
+
+bool is_finite(const btVector3& v) { return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z()); }
+
+bool is_inverse_mass(btScalar inverse_mass) { return inverse_mass >= 0 && std::isfinite(inverse_mass); }
+
+[[noreturn]] void refuse(int node, const std::string& what, Real value, const char* range) {
+  throw std::invalid_argument("attach: node " + std::to_string(node) + ": " + what + " is " + to_text(value) +
+                              ", must be " + range);
+}
+
+void check(const btVector3& v, int node, const std::string& what) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (!std::isfinite(v[axis])) refuse(node, what + " " + "xyz"[axis], Real(v[axis]), "finite");
+}
+
+}  // namespace
+
+Nodes::Nodes(btSoftBody& body, Particles& particles) : body_(&body) {
+  const int size = body.m_nodes.size();
+  particles.positions = PackedVectors::Zero(4, size);
+  particles.velocities = PackedVectors::Zero(4, size);
+  particles.inverse_masses.resize(size);
+  written_positions_.resize(size);
+  written_velocities_.resize(size);
+  read_inverse_masses_.resize(size);
+  for (int i = 0; i < size; ++i) {
+    const btSoftBody::Node& node = body.m_nodes[i];
+    check(node.m_x, i, "position");
+    check(node.m_v, i, "velocity");
+    if (!is_inverse_mass(node.m_im)) refuse(i, "inverse mass", Real(node.m_im), "zero (pinned) or positive and finite");
+    particles.positions.col(i).head<3>() = to_vector(node.m_x);
+    particles.velocities.col(i).head<3>() = to_vector(node.m_v);
+    particles.inverse_masses[i] = node.m_im;
+    read_inverse_masses_[i] = node.m_im;
+    remember(i);
+  }
+}
+
+void Nodes::remember(int node) {
+  written_positions_[node] = body_->m_nodes[node].m_x;
+  written_velocities_[node] = body_->m_nodes[node].m_v;
+}
+
+void Nodes::reject(int node, const char* what) {
+  if (rejected_.node < 0) rejected_ = {node, what};
+}
+
+NodeChanges Nodes::read(Particles& particles) {
+  if (body_->m_nodes.size() != particles.size())
+    throw std::logic_error("the soft body has " + std::to_string(body_->m_nodes.size()) + " nodes, had " +
+                           std::to_string(particles.size()) + " when it was attached: detach it, attach it again");
+  NodeChanges changes;
+  rejected_ = {};
+  for (int i = 0; i < particles.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    if (!is_inverse_mass(node.m_im)) {
+      reject(i, "inverse mass is negative or not finite");
+      node.m_im = read_inverse_masses_[i];
+    }
+    const btVector3 dx = node.m_x - written_positions_[i], dv = node.m_v - written_velocities_[i];
+    if (!std::isfinite(dx.length2()) || !std::isfinite(dv.length2())) {
+      reject(i, std::isfinite(dx.length2()) ? "velocity is not finite" : "position is not finite");
+      node.m_x = written_positions_[i];
+      node.m_v = written_velocities_[i];
+      continue;
+    }
+    if (!dx.isZero()) {
+      particles.positions.col(i).head<3>() += to_vector(dx);
+      changes.moved = true;
+    }
+    if (!dv.isZero()) particles.velocities.col(i).head<3>() += to_vector(dv);
+    if (node.m_im != read_inverse_masses_[i]) {
+      changes.lighter = changes.lighter || node.m_im > read_inverse_masses_[i];
+      read_inverse_masses_[i] = node.m_im;
+      particles.inverse_masses[i] = node.m_im;
+    }
+    remember(i);
+  }
+  return changes;
+}
+
+bool Nodes::read_forces(PackedVectors& forces) {
+  const int size = body_->m_nodes.size();
+  bool any = false;
+  for (int i = 0; i < size; ++i) {
+    btVector3& force = body_->m_nodes[i].m_f;
+    if (!is_finite(force)) {
+      reject(i, "force is not finite");
+      force.setZero();
+    }
+    any = any || !force.isZero();
+  }
+  if (!any && forces.size() == 0) return false;
+  if (!any) {
+    forces.resize(4, 0);
+    return true;
+  }
+  forces.setZero(4, size);
+  for (int i = 0; i < size; ++i) {
+    forces.col(i).head<3>() = to_vector(body_->m_nodes[i].m_f);
+    body_->m_nodes[i].m_f.setZero();
+  }
+  return true;
+}
+
+bool Nodes::can_hold(const Particles& particles) {
+  btScalar sum = 0;  // zero times what is finite is zero
+  for (int i = 0; i < particles.size(); ++i) {
+    const btVector3 x = to_bullet(particles.positions.col(i)), v = to_bullet(particles.velocities.col(i));
+    sum += btScalar(0) * (x.x() + x.y() + x.z()) + btScalar(0) * (v.x() + v.y() + v.z());
+  }
+  return sum == 0;
+}
+
+void Nodes::write_mean_velocities(const Particles& particles, const PackedVectors& start, Real duration,
+                                  const Vector3& gravity_dv) {
+  for (int i = 0; i < particles.size(); ++i) {
+    const Vector3 mean = (particles.positions.col(i) - start.col(i)).head<3>() / duration;
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_x = written_positions_[i];
+    node.m_v = to_bullet(Vector3(node.m_im > 0 ? mean - gravity_dv : mean));
+    if (!is_finite(node.m_v)) node.m_v.setZero();
+  }
+}
+
+void Nodes::remember_velocities() {
+  for (int i = 0; i < body_->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_vn = node.m_v;  // in implicit mode Bullet's solve starts from here
+    written_velocities_[i] = node.m_v;
+  }
+}
+
+void Nodes::write(const Particles& particles, Real lead) {
+  for (int i = 0; i < particles.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_x = to_bullet(particles.positions.col(i));
+    node.m_v = to_bullet(particles.velocities.col(i));
+    node.m_q = node.m_x - node.m_v * static_cast<btScalar>(lead);
+    node.m_vn = node.m_v;
+    remember(i);
+  }
+}
+
+bool Nodes::read_velocity_changes(Particles& particles, Real duration) {
+  bool moved = false;
+  for (int i = 0; i < particles.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    const Vector3 dv = to_vector(node.m_v - written_velocities_[i]);
+    const Vector3 shift = duration * (dv + to_vector(node.m_splitv));
+    if (shift.isZero(0)) continue;
+    if (!shift.allFinite()) {
+      reject(i, "velocity after Bullet's contacts is not finite");
+      continue;
+    }
+    particles.velocities.col(i).head<3>() += dv;
+    particles.positions.col(i).head<3>() += shift;
+    moved = true;
+  }
+  return moved;
+}
+
+void Nodes::positions_to_velocities(Real inverse_duration) {
+  for (int i = 0; i < body_->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_v = written_velocities_[i] + (node.m_x - written_positions_[i]) * static_cast<btScalar>(inverse_duration);
+  }
+}
+
+void Nodes::freeze() {
+  for (int i = 0; i < body_->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_v.setZero();
+    node.m_vn.setZero();
+    node.m_splitv.setZero();
+    node.m_q = node.m_x;
+  }
+  forget_contacts();
+}
+
+void Nodes::thaw() {
+  for (int i = 0; i < body_->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_v = i < written_velocities_.size() ? written_velocities_[i] : btVector3(0, 0, 0);
+    node.m_vn = node.m_v;
+    node.m_q = node.m_x;
+  }
+}
+
+void Nodes::stop() {
+  for (int i = 0; i < written_velocities_.size(); ++i) written_velocities_[i].setZero();
+}
+
+void Nodes::forget_contacts() {
+  for (int i = 0; i < body_->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body_->m_nodes[i];
+    node.m_effectiveMass_inv = btMatrix3x3::getIdentity() * node.m_im;
+  }
+  body_->m_rcontacts.resizeNoInitialize(0);
+  body_->m_scontacts.resizeNoInitialize(0);
+  body_->m_nodeRigidContacts.resizeNoInitialize(0);
+  body_->m_faceRigidContacts.resizeNoInitialize(0);
+  body_->m_faceNodeContacts.resizeNoInitialize(0);
+  body_->m_faceNodeContactsCCD.resizeNoInitialize(0);
+}
+
+}  // namespace penalty

@@ -1,0 +1,149 @@
+#include "obstacles.h"
+
+#include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "convert.h"
+#include "held_bodies.h"
+#include "sleeping.h"
+#include "surface_distance.h"
+#include "world_island.h"
+
+namespace penalty {
+namespace {
+
+// The collision objects that a soft body may touch, of those in a box.
+class Candidates final : public btBroadphaseAabbCallback {
+ public:
+  explicit Candidates(const btSoftBody& body) : body_(body) {}
+
+  bool process(const btBroadphaseProxy* proxy) override {
+    auto* object = static_cast<btCollisionObject*>(proxy->m_clientObject);
+    if (object->getInternalType() == btCollisionObject::CO_SOFT_BODY || !object->hasContactResponse()) return true;
+    if (object->getCollisionShape()->isSoftBody()) return true;
+    if (body_.m_collisionDisabledObjects.findLinearSearch(object) != body_.m_collisionDisabledObjects.size())
+      return true;
+    if (!object->checkCollideWith(&body_) || !body_.checkCollideWith(object)) return true;
+    if (const btBroadphaseProxy* own = body_.getBroadphaseHandle())
+      if (!(proxy->m_collisionFilterGroup & own->m_collisionFilterMask) ||
+          !(own->m_collisionFilterGroup & proxy->m_collisionFilterMask))
+        return true;
+    objects.push_back(object);
+    return true;
+  }
+
+  std::vector<btCollisionObject*> objects;
+
+ private:
+  const btSoftBody& body_;
+};
+
+Vector3 position_of(const ContactPoint& point, const PackedVectors& vectors) {
+  Vector3 sum = Vector3::Zero();
+  for (int k = 0; k < point.num_particles; ++k) sum += point.weights[k] * vectors.col(point.particles[k]).head<3>();
+  return sum;
+}
+
+Real radius_about_origin(const btCollisionShape& shape) {
+  btVector3 center;
+  btScalar radius = 0;
+  shape.getBoundingSphere(center, radius);
+  return center.length() + radius;
+}
+
+// How far a rigid body may come towards a soft one in a step.
+Real reach_of(const btRigidBody& rigid, Real duration) {
+  return duration * (Real(rigid.getLinearVelocity().length()) +
+                     Real(rigid.getAngularVelocity().length()) *
+                         std::min(radius_about_origin(*rigid.getCollisionShape()), 1e6)) +
+         Real(rigid.getGravity().length()) * duration * duration;
+}
+
+}  // namespace
+
+Box bounds_of(const btCollisionObject& object) {
+  btVector3 low, high;
+  object.getCollisionShape()->getAabb(object.getWorldTransform(), low, high);
+  return {to_vector(low), to_vector(high)};
+}
+
+std::vector<btCollisionObject*> obstacles_near(btSoftBody& body, const Box& box, Real padding) {
+  Candidates found(body);
+  const Vector3 pad = Vector3::Constant(padding);
+  body.getWorldInfo()->m_broadphase->aabbTest(to_bullet(Vector3(box.low - pad)), to_bullet(Vector3(box.high + pad)),
+                                              found);
+  // The broadphase has no order of its own; results must not depend on where objects lie in memory.
+  std::sort(found.objects.begin(), found.objects.end(), [](const btCollisionObject* a, const btCollisionObject* b) {
+    return a->getBroadphaseHandle()->m_uniqueId < b->getBroadphaseHandle()->m_uniqueId;
+  });
+  return std::move(found.objects);
+}
+
+bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies, Real duration) {
+  SteppedBody& stepped = held.stepped;
+  const Particles& particles = stepped.particles;
+  btSoftBody& body = *held.body;
+  stepped.contacts.clear();
+  if (!body.hasContactResponse()) return true;
+
+  const Real margin = body.getCollisionShape()->getMargin();
+  const Real fall = stepped.gravity.norm() * duration * duration;
+  Box box;
+  Real fastest = 0;
+  for (int i = 0; i < particles.size(); ++i) {
+    box.add(particles.positions.col(i).head<3>());
+    fastest = std::max(fastest, particles.velocities.col(i).head<3>().squaredNorm());
+  }
+  fastest = std::sqrt(fastest);
+  const Real sweep = fastest * duration + fall + margin;
+  if (!std::isfinite(sweep + box.low.sum() + box.high.sum())) return true;
+
+  // Bullet's boxes are those of the last step: look further around, then test each object where it is and as fast as it is.
+  const Real around = std::max(sweep, (box.high - box.low).norm());
+  bool friction_is_finite = true;
+  std::vector<SurfacePoint> surface;
+  for (btCollisionObject* object : obstacles_near(body, box, around)) {
+    const btRigidBody* rigid = btRigidBody::upcast(object);
+    const Real reach = sweep + (rigid ? reach_of(*rigid, duration) : 0);
+    const Box object_box = bounds_of(*object);
+    if (!object_box.overlaps(box, reach)) continue;
+
+    const Vector3 origin = to_vector(object->getWorldTransform().getOrigin());
+    const Matrix3 rotation = to_matrix(object->getWorldTransform().getBasis());
+    Real friction = Real(body.m_cfg.kDF) * Real(object->getFriction());
+    if (!std::isfinite(friction)) {
+      friction = 0;
+      friction_is_finite = false;
+    }
+    const auto add_point = [&](const ContactPoint& point) {
+      const Vector3 x = position_of(point, particles.positions);
+      if (!object_box.contains(x, reach)) return;
+      surface.clear();
+      append_surface_points(*object->getCollisionShape(), rotation.transpose() * (x - origin), margin + reach, surface);
+      const Vector3 v = surface.empty() ? Vector3(Vector3::Zero()) : position_of(point, particles.velocities);
+      for (const SurfacePoint& nearest : surface) {
+        const bool approached = -v.dot(rotation * nearest.normal) > waking_speed;
+        Contact contact;
+        contact.point = point;
+        contact.rigid_body = rigid_bodies.touch(*object, approached, island.touched);
+        contact.radius = nearest.radius > 0 ? nearest.radius + margin : 0;
+        contact.anchor = nearest.point + (margin - contact.radius) * nearest.normal;
+        contact.normal = nearest.normal;
+        contact.friction = friction;
+        stepped.contacts.push_back(contact);
+      }
+    };
+    if (held.options.contact_points.empty()) {
+      for (int i = 0; i < particles.size(); ++i)
+        if (particles.inverse_masses[i] > 0) add_point(ContactPoint::at_particle(i));
+    } else {
+      for (const ContactPoint& point : held.options.contact_points) add_point(point);
+    }
+  }
+  return friction_is_finite;
+}
+
+}  // namespace penalty

@@ -1,0 +1,111 @@
+#include "rigid_bodies.h"
+
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include "convert.h"
+
+namespace penalty {
+namespace {
+
+// What will accelerate the body besides contacts. The classic world adds all forces in its own solver, later; the deformable
+// world has already added gravity to the velocity, and with it the forces of the application.
+Vector3 known_acceleration(const btRigidBody& body, bool gravity_applied) {
+  const Vector3 factor = to_vector(body.getLinearFactor());
+  return gravity_applied ? Vector3(to_vector(body.getGravity()).cwiseProduct(factor))
+                         : Vector3(Real(body.getInvMass()) * to_vector(body.getTotalForce()).cwiseProduct(factor));
+}
+
+Matrix3 inverse_inertia(const btRigidBody& body) {
+  const Matrix3 factor = to_vector(body.getAngularFactor()).asDiagonal();
+  return factor * to_matrix(body.getInvInertiaTensorWorld()) * factor;
+}
+
+}  // namespace
+
+void RigidBodies::begin_step(Real duration, bool gravity_applied) {
+  ++step_;
+  duration_ = duration;
+  gravity_applied_ = gravity_applied;
+  std::erase_if(expectations_, [this](const auto& entry) { return entry.second.step < step_ - 1; });
+}
+
+// The state of an object at the start of the step. Static, sleeping or not a rigid body at all: an obstacle at rest.
+RigidBody RigidBodies::start_of(const btCollisionObject& object) const {
+  RigidBody start;
+  start.position = to_vector(object.getWorldTransform().getOrigin());
+  start.rotation = to_matrix(object.getWorldTransform().getBasis());
+  const btRigidBody* body = btRigidBody::upcast(&object);
+  if (!body || body->isStaticObject()) return start;
+  const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
+  if (!is_dynamic && !body->isKinematicObject()) return start;
+  start.velocity = to_vector(body->getLinearVelocity());
+  start.angular_velocity = to_vector(body->getAngularVelocity());
+  if (!is_dynamic) return start;
+
+  start.inverse_mass = Real(body->getInvMass()) * to_vector(body->getLinearFactor());
+  start.inverse_inertia = inverse_inertia(*body);
+  start.acceleration = known_acceleration(*body, gravity_applied_);
+  if (gravity_applied_) start.velocity -= duration_ * start.acceleration;
+  // What other contacts did to this body in the last step they will do again: without it a body that lies on the ground
+  // would fall through every sub-cycle. Limited, so that an impact is not repeated.
+  const auto expected = expectations_.find(object.getBroadphaseHandle()->m_uniqueId);
+  if (expected != expectations_.end() && expected->second.step == step_ - 1) {
+    Vector3 other = (start.velocity - expected->second.velocity) / duration_;
+    const Real limit =
+        start.acceleration.norm() + expected->second.impulse.cwiseProduct(start.inverse_mass).norm() / duration_;
+    const Real size = other.norm();
+    if (size > limit) other *= limit / size;
+    start.acceleration += other;
+  }
+  return start;
+}
+
+int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<TouchedRigidBody>& touched) const {
+  btRigidBody* body = btRigidBody::upcast(&object);
+  const bool wake = approached && body && !body->isStaticOrKinematicObject() && !body->isActive();
+  if (wake) body->activate();
+  const int key = object.getBroadphaseHandle()->m_uniqueId;
+  for (std::size_t k = 0; k < touched.size(); ++k)
+    if (touched[k].key == key) {
+      if (wake) touched[k].start = start_of(object);
+      return static_cast<int>(k);
+    }
+  touched.push_back({body, key, start_of(object), {}});
+  return static_cast<int>(touched.size()) - 1;
+}
+
+void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states) {
+  for (std::size_t k = 0; k < touched.size(); ++k) {
+    TouchedRigidBody& t = touched[k];
+    t.state = states[k];
+    if (!t.start.is_dynamic()) continue;
+    const Vector3 dv = t.state.impulse.cwiseProduct(t.start.inverse_mass);
+    const Vector3 dw = t.state.angular_velocity - t.start.angular_velocity;
+    if (!dv.allFinite() || !dw.allFinite()) continue;
+    btRigidBody& body = *t.body;
+    body.setLinearVelocity(body.getLinearVelocity() + to_bullet(dv));
+    body.setAngularVelocity(body.getAngularVelocity() + to_bullet(dw));
+    const Vector3 expected = t.start.velocity + dv + duration_ * known_acceleration(body, gravity_applied_);
+    if (expected.allFinite()) expectations_[t.key] = {step_, expected, t.state.impulse};
+  }
+}
+
+void RigidBodies::correct(std::span<const TouchedRigidBody> touched, Real duration) {
+  for (const TouchedRigidBody& t : touched) {
+    if (!t.start.is_dynamic() || !t.body->isActive()) continue;  // who fell asleep was not moved
+    const Vector3 shift = t.state.position - t.start.position - duration * t.state.velocity;
+    const Vector3 turn = t.state.turn - duration * t.state.angular_velocity;
+    if (!shift.allFinite() || !turn.allFinite()) continue;
+    btTransform transform = t.body->getWorldTransform();
+    transform.setOrigin(transform.getOrigin() + to_bullet(shift));
+    const Real angle = turn.norm();
+    if (angle > 1e-12)
+      transform.setRotation(
+          (btQuaternion(to_bullet(Vector3(turn / angle)), static_cast<btScalar>(angle)) * transform.getRotation())
+              .normalized());
+    t.body->setWorldTransform(transform);
+    t.body->setInterpolationWorldTransform(transform);
+  }
+}
+
+}  // namespace penalty

@@ -1,0 +1,52 @@
+// Rigid bodies, read before the step and corrected after it.
+#pragma once
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "penalty/stepping/rigid_body.h"
+
+class btCollisionObject;
+class btRigidBody;
+
+namespace penalty {
+
+/// An object that takes part in a step.
+struct TouchedRigidBody {
+  btRigidBody* body;  // null: an obstacle that is no rigid body
+  int key;            // unique id of its broadphase proxy
+  RigidBody start, state;
+};
+
+/// One step's dealings with Bullet's rigid bodies, and what is expected of them in the next.
+class RigidBodies {
+ public:
+  /// `gravity_applied`: the world has already added gravity to the velocities of rigid bodies.
+  void begin_step(Real duration, bool gravity_applied);
+
+  /// The index of the object among those of an island, taking it in if it is new and waking it if a soft body comes at it.
+  int touch(btCollisionObject& object, bool approached, std::vector<TouchedRigidBody>& touched) const;
+
+  /// Adds to the velocities what soft bodies did to them.
+  void hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states);
+
+  /// Moves touched bodies from where Bullet's integration with the end velocity put them to where the sub-cycle took them. Call
+  /// after Bullet has integrated the transforms.
+  static void correct(std::span<const TouchedRigidBody> touched, Real duration);
+
+ private:
+  // What was expected of a rigid body after the last step: the difference is what other contacts did to it.
+  struct Expectation {
+    int step;
+    Vector3 velocity, impulse;
+  };
+
+  RigidBody start_of(const btCollisionObject& object) const;
+
+  std::unordered_map<int, Expectation> expectations_;
+  int step_ = 0;
+  Real duration_ = 0;
+  bool gravity_applied_ = false;
+};
+
+}  // namespace penalty

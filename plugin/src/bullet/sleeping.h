@@ -1,0 +1,27 @@
+// Who wakes whom, and who may fall asleep. Bullet decides; it does not know of soft contacts and couplings.
+#pragma once
+#include <span>
+
+#include "penalty/math/types.h"
+
+class btSoftBody;
+
+namespace penalty {
+
+class Couplings;
+struct WorldIsland;
+
+/// Slower than this [m/s], touching does not wake what sleeps.
+inline constexpr Real waking_speed = 0.1;
+
+/// A sleeping soft body wakes when something that moves comes near.
+void wake_if_hit(btSoftBody& body);
+
+/// A soft body sleeps only after what it carries, which in turn waits, as one island of Bullet's, for the soft body.
+void wait_for_carried(btSoftBody& body, const WorldIsland& island);
+
+/// Coupled bodies sleep together or not at all: while one is restless, those that want to sleep stay awake, and keep the time
+/// that they have been at rest, so that all fall asleep when the last of them may.
+void keep_coupled_awake(const Couplings& couplings);
+
+}  // namespace penalty

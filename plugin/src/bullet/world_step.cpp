@@ -1,0 +1,219 @@
+#include "world_step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "convert.h"
+#include "obstacles.h"
+#include "sleeping.h"
+
+namespace penalty {
+namespace {
+
+// Calls; if that throws, `failed` hears what was said.
+template <class Call, class Failed>
+void shield(const Call& call, const Failed& failed) noexcept {
+  try {
+    call();
+  } catch (const std::exception& error) {
+    failed(error.what());
+  } catch (...) {
+    failed("something was thrown that is no std::exception");
+  }
+}
+
+Real zero_if_finite(const btVector3& v) { return 0 * Real(v.x()) + 0 * Real(v.y()) + 0 * Real(v.z()); }
+
+// What Bullet's own part of the step would spread over the nodes, and on into its trees, for good. Null: nothing.
+const char* not_finite_setting(const btSoftBody& body) {
+  const btSoftBodyWorldInfo& info = *body.m_worldInfo;
+  const btSoftBody::Config& config = body.m_cfg;
+  const std::pair<Real, const char*> settings[] = {
+      {zero_if_finite(info.m_gravity), "the gravity of its world info is not finite"},
+      {Real(body.m_gravityFactor), "its gravity factor is not finite"},
+      {Real(body.getCollisionShape()->getMargin()), "its collision margin is not finite"},
+      {Real(config.timescale), "m_cfg.timescale is not finite"},
+      {Real(config.kDF), "its friction, m_cfg.kDF, is not finite"},
+      {Real(config.kDP), "m_cfg.kDP is not finite"},
+      {Real(config.drag), "m_cfg.drag is not finite"},
+      {Real(config.kDG), "m_cfg.kDG is not finite"},
+      {Real(config.kLF), "m_cfg.kLF is not finite"},
+      {Real(config.kPR), "m_cfg.kPR is not finite"},
+      {Real(config.kVC), "m_cfg.kVC is not finite"},
+      {Real(config.kMT), "m_cfg.kMT is not finite"},
+      {zero_if_finite(body.m_windVelocity), "its wind velocity is not finite"},
+  };
+  for (const auto& [value, problem] : settings)
+    if (!std::isfinite(value)) return problem;
+  return nullptr;
+}
+
+void set_problem(StepReport& report, const char* what, int particle, const char* then) noexcept {
+  shield([&] { report.problem = what + std::to_string(particle) + then; },
+         [&](const char*) { report.problem = "not finite"; });
+}
+
+}  // namespace
+
+void report_rejected(HeldBody& held) noexcept {
+  const RejectedNode& rejected = held.nodes.rejected();
+  if (rejected.node < 0) return;
+  StepReport& report = held.stepped.report;
+  report.finite = false;
+  report.first_bad_particle = rejected.node;
+  shield(
+      [&] {
+        report.problem = "node " + std::to_string(rejected.node) + ": its " + rejected.what + ", and was set back";
+      },
+      [&](const char*) { report.problem = "not finite"; });
+}
+
+bool stays_in_range(HeldBody& held) noexcept {
+  if (Nodes::can_hold(held.stepped.particles)) return true;
+  held.hold("it went where Bullet's precision has no numbers", true);
+  held.stepped.report.finite = false;
+  return false;
+}
+
+std::span<HeldBody* const> AttachedBodies::World::step(std::span<btSoftBody* const> listed, Real duration,
+                                                       bool gravity_applied) noexcept {
+  stepped_.clear();
+  islands_.clear();
+  bodies->list(listed);
+  if (!(duration > 0) || !std::isfinite(duration)) {
+    hold_all(listed, "the time step is not positive and finite: no step was made", std::isfinite(duration));
+    return {};
+  }
+  shield(
+      [&] {
+        rigid_bodies_.begin_step(duration, gravity_applied);
+        step_all(listed, duration);
+      },
+      [&](const char* problem) {
+        islands_.clear();
+        stepped_.clear();
+        hold_all(listed, problem, true);
+      });
+  return stepped_;
+}
+
+// What the application changed is read all the same.
+void AttachedBodies::World::hold_all(std::span<btSoftBody* const> listed, const char* problem, bool finite) noexcept {
+  for (btSoftBody* body : listed) {
+    HeldBody* held = bodies->find(*body);
+    if (!held || !body->isActive()) continue;
+    shield(
+        [&] {
+          held->read_nodes();
+          held->hold(problem, false);
+          held->stepped.report.finite = finite;
+        },
+        [&](const char* other) { held->hold(other, true); });
+  }
+}
+
+void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real duration) {
+  stepped_.reserve(listed.size());
+  for (btSoftBody* body : listed)
+    if (bodies->find(*body)) wake_if_hit(*body);
+  couplings.find_bodies(*bodies, listed);
+  keep_coupled_awake(couplings);
+  couplings.hold_bodies_of_incomplete();
+  for (btSoftBody* body : listed) {
+    HeldBody* held = bodies->find(*body);
+    if (!held || !body->isActive() || held->outcome == StepOutcome::held) continue;
+    shield([&] { prepare(*held, duration); }, [&](const char* problem) { held->hold(problem, true); });
+  }
+  couplings.hold_coupled();
+  join_islands();
+  for (WorldIsland& island : islands_) advance(island, duration);
+  for (btSoftBody* body : listed)
+    if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) stepped_.push_back(held);
+}
+
+// Reads what the world says of the body and begins an island with it.
+void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
+  SteppedBody& stepped = held.stepped;
+  btSoftBody& body = *held.body;
+  held.read_nodes();
+  if (held.nodes.read_forces(stepped.external_forces)) stepped.positions_changed();
+  if (const char* problem = not_finite_setting(body)) {
+    held.hold(problem, false);
+    stepped.report.finite = false;
+    return;
+  }
+  stepped.gravity = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_gravityFactor);
+  if (held.stale || held.estimated_version != held.field.stiffness_version()) {
+    estimate_stability(stepped, held.field.rest_positions());
+    held.stale = false;
+    held.estimated_version = held.field.stiffness_version();
+  }
+  WorldIsland island;
+  island.held.push_back(&held);
+  held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, duration);
+  wait_for_carried(body, island);
+  islands_.push_back(std::move(island));
+}
+
+// Bodies that are coupled, or touch the same movable rigid body, are stepped together.
+void AttachedBodies::World::join_islands() {
+  std::erase_if(islands_, [](const WorldIsland& island) { return island.held.front()->outcome == StepOutcome::held; });
+  couplings.join(islands_, rigid_bodies_);
+  for (std::size_t i = 0; i < islands_.size(); ++i)
+    for (std::size_t j = i + 1; j < islands_.size();)
+      if (!islands_[j].held.empty() && islands_[i].shares_a_rigid_body_with(islands_[j])) {
+        islands_[i].absorb(islands_[j]);
+        j = i + 1;  // what came in may touch more
+      } else {
+        ++j;
+      }
+  std::erase_if(islands_, [](const WorldIsland& island) { return island.held.empty(); });
+}
+
+void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept {
+  const auto hold_island = [&](const char* problem) {
+    for (HeldBody* held : island.held) held->hold(problem, true);
+    island.touched.clear();
+  };
+  shield(
+      [&] {
+        island.advance(duration, states_);
+        rigid_bodies_.hand_back(island.touched, states_);
+      },
+      hold_island);
+  for (HeldBody* held : island.held) {
+    if (held->outcome == StepOutcome::held) continue;
+    held->outcome = StepOutcome::stepped;
+    StepReport& report = held->stepped.report;
+    if (!report.finite)
+      set_problem(report, "the step did not stay finite and was undone; look at particle ", report.first_bad_particle,
+                  "");
+    else if (!held->friction_is_finite)
+      shield([&] { report.problem = "the friction of an object that it touches is not finite, and was left out"; },
+             [](const char*) {});
+    report_rejected(*held);
+  }
+}
+
+void AttachedBodies::World::read_solved(HeldBody& held) noexcept {
+  shield([&] { held.read_nodes(); }, [&](const char* problem) { held.hold(problem, true); });
+  report_rejected(held);
+}
+
+void AttachedBodies::World::freeze_held(std::span<btSoftBody* const> listed) const noexcept {
+  for (btSoftBody* body : listed)
+    if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::held) held->nodes.freeze();
+}
+
+void AttachedBodies::World::thaw_held(std::span<btSoftBody* const> listed) const noexcept {
+  for (btSoftBody* body : listed)
+    if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::held) held->nodes.thaw();
+}
+
+void AttachedBodies::World::correct_rigid_bodies(Real duration) noexcept {
+  for (const WorldIsland& island : islands_) RigidBodies::correct(island.touched, duration);
+  islands_.clear();
+}
+
+}  // namespace penalty
