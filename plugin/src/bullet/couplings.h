@@ -28,7 +28,7 @@ struct HeldCoupling {
   int number;
   std::vector<HeldPoint> points;
   PotentialField field;
-  Coupling stepped;
+  Coupling stepped = {};
   std::uint64_t estimated_version = 0;
   bool is_complete = true;  // all its bodies are in the world
 
