@@ -65,3 +65,10 @@ foreach(suffix "" "-float64")
              COMMAND bash ${PROJECT_SOURCE_DIR}/tests/package/symbols.sh ${penalty_libraries})
   endif()
 endforeach()
+
+# What applications include leaves the insides of the solver alone: they cost each of their sources time to compile.
+if(TARGET bullet_penalty)
+  add_test(NAME package.headers COMMAND ${CMAKE_COMMAND} -D COMPILER=${CMAKE_CXX_COMPILER}
+    -D "INCLUDES=$<TARGET_PROPERTY:bullet_penalty,INCLUDE_DIRECTORIES>"
+    -P ${PROJECT_SOURCE_DIR}/tests/package/check_headers.cmake)
+endif()
