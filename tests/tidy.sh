@@ -42,7 +42,7 @@ trap 'rm -f "$log"' EXIT
 # Each finding once, although a header is seen by many sources.
 if printf '%s\0' "${sources[@]}" |
   xargs -0 -n 1 -P "$jobs" "$tidy" --quiet -p build/tidy 2>/dev/null |
-  awk '/^\/.*: (warning|error): / { show = !seen[$0]++ } show' | tee "$log" && ! [ -s "$log" ]; then
+  awk '/^\/.*: (warning|error): / { show = !seen[$0]++ } show { print; fflush() }' | tee "$log" && ! [ -s "$log" ]; then
   echo "tests/tidy.sh: PASSED (${#sources[@]} sources, $SECONDS s)"
 else
   echo "tests/tidy.sh: FAILED ($(grep -cE '^/.*: (warning|error): ' "$log" || true) findings in ${#sources[@]} sources, $SECONDS s)"

@@ -95,7 +95,7 @@ elseif(STEP STREQUAL "subproject")
     "if(CMAKE_BUILD_TYPE)\n  message(FATAL_ERROR \"BulletPenalty has chosen a build type for us\")\nendif()\n"
     "add_executable(${name} ${SOURCE}/tests/package/jelly_box.cpp)\n"
     "target_link_libraries(${name} PRIVATE BulletPenalty::${target})\n")
-  run(${CMAKE_COMMAND} -G ${GENERATOR} -D CMAKE_CXX_COMPILER=${COMPILER} "-D CMAKE_CXX_FLAGS=${FLAGS} -O0"
+  run(${CMAKE_COMMAND} -G ${GENERATOR} -D CMAKE_CXX_COMPILER=${COMPILER} -D "CMAKE_CXX_FLAGS=${FLAGS} -O0"
       -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -D CMAKE_INSTALL_LIBDIR=${LIBDIR} -D BUILD_SHARED_LIBS=ON
       -D BULLET_PENALTY_INSTALL=ON -D BULLET_PENALTY_PRECISIONS=${PRECISIONS} -S ${scratch} -B ${scratch}/build)
   if(EXISTS ${scratch}/build/compile_commands.json)
