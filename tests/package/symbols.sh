@@ -4,6 +4,9 @@
 # program gets depends on what else it links. Status 1, and a line for each symbol of that kind.
 set -euo pipefail
 [ $# -gt 0 ] || { echo "usage: symbols.sh LIBRARY..." >&2; exit 2; }
+for library in "$@"; do
+  [ -f "$library" ] || { echo "symbols.sh: there is no $library" >&2; exit 2; }
+done
 
 # Lines "library[member]: address type symbol"; a shared library has no member.
 nm --defined-only -A "$@" 2>/dev/null | awk '
