@@ -1,6 +1,7 @@
 # cmake -D COMPILER=... -D INCLUDES=... -P check_headers.cmake, in a scratch directory: which headers
 # <penalty/bullet_penalty.h> brings along.
 cmake_minimum_required(VERSION 3.22)
+list(REMOVE_ITEM INCLUDES "")
 list(TRANSFORM INCLUDES PREPEND "-I")
 file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/headers.cpp "#include <penalty/bullet_penalty.h>\n")
 execute_process(COMMAND ${COMPILER} -std=c++20 ${INCLUDES} -M ${CMAKE_CURRENT_BINARY_DIR}/headers.cpp OUTPUT_VARIABLE dependencies COMMAND_ERROR_IS_FATAL ANY)
