@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds penalty-demo and runs every scene at preview quality into demos/out/<scene>/: a still,
-# a clip, a summary, energies as a table and as curves. Works on a bare Debian 12, as root or with sudo.
+# a clip, a summary, energies as a table and as curves. Works on a bare Debian 12 or 13, as root or with sudo.
 #
 #   demos/run.sh [--jobs N] [--no-install] [-- ARGUMENT...]
 #

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds and runs all tests. Works on a bare Debian 12, as root or with sudo.
+# Installs what is missing, checks the format, builds and runs all tests. Works on a bare Debian 12 or 13, as root or with sudo.
 #
-#   tests/run.sh [--preset release|debug|asan-ubsan|float64] [--jobs N] [--no-install] [-- CTEST_ARGUMENT...]
+#   tests/run.sh [--preset NAME] [--jobs N] [--no-install] [-- CTEST_ARGUMENT...]
 #
+# Presets: release, debug, asan-ubsan, tsan, float64, werror, clang.
 # --no-install leaves the packages alone. `tests/run.sh -- -R mesh` runs only the tests whose names contain "mesh". The last
 # line printed is the verdict; the status is 0 if everything passed, 1 if not, 2 for arguments that make no sense.
 set -euo pipefail
@@ -18,7 +19,7 @@ while [ $# -gt 0 ]; do
     --jobs) jobs=${2:-}; shift ;;
     --no-install) install=no ;;
     --) shift; ctest_arguments=("$@"); break ;;
-    -h | --help) sed -n '2,7s/^# \{0,1\}//p' tests/run.sh; exit 0 ;;
+    -h | --help) sed -n '2,8s/^# \{0,1\}//p' tests/run.sh; exit 0 ;;
     *) echo "tests/run.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
   esac
   shift || true
@@ -55,8 +56,13 @@ step() {
 
 if [ "$install" = yes ]; then
   step "installing packages"
-  bash third_party_notes/install.sh tests
+  case $preset in
+    clang) bash third_party_notes/install.sh tests clang ;;
+    *) bash third_party_notes/install.sh tests ;;
+  esac
 fi
+step "checking the format"
+bash tests/format.sh
 step "configuring build/$preset"
 cmake --preset "$preset" -D BULLET_PENALTY_BUILD_TESTS=ON -D BULLET_PENALTY_BUILD_DEMOS=ON
 step "building with $jobs jobs"

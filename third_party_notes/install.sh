@@ -1,19 +1,23 @@
 #!/usr/bin/env bash
-# third_party_notes/install.sh demos|tests: installs the Debian packages that the demos or the tests need and that are not
-# there yet. Needs root, or sudo, only if something is missing. This is the one place that lists the packages; README.md
-# beside it says what each of them is.
+# third_party_notes/install.sh demos | tests [clang] | tidy: installs the Debian packages that the demos, the tests (with clang as
+# the compiler) or tests/tidy.sh need and that are not there yet. Needs root, or sudo, only if something is missing. This is
+# the one place that lists the packages; README.md beside it says what each of them is.
 set -euo pipefail
 say() { echo "install.sh: $*"; }
 
 build=(g++ cmake ninja-build pkg-config libbullet-dev libeigen3-dev libgtest-dev)  # a plain configure includes the tests
-demos=(libassimp-dev libcli11-dev nlohmann-json3-dev libpng-dev libstb-dev libgl-dev libosmesa6 fonts-dejavu-core ffmpeg
-       glmark2-data)
-tests=(libbenchmark-dev libegl1 libgl1-mesa-dri parallel)
+demos=(libassimp-dev libcli11-dev nlohmann-json3-dev libpng-dev libstb-dev libgl-dev libegl1 libgl1-mesa-dri fonts-dejavu-core
+       ffmpeg glmark2-data)
+tests=(libbenchmark-dev parallel clang-format-19)
+where_offered=(libosmesa6)  # Mesa gave it up in version 25.1: where it is gone, the demos draw with EGL
 
-case "${1:-}" in
-  demos) wanted=("${build[@]}" "${demos[@]}") ;;
-  tests) wanted=("${build[@]}" "${demos[@]}" "${tests[@]}") ;;
-  *) echo "usage: $0 demos|tests" >&2; exit 2 ;;
+wanted=("${build[@]}" "${demos[@]}")
+case "$*" in
+  demos) ;;
+  tests) wanted+=("${tests[@]}") ;;
+  "tests clang") wanted+=("${tests[@]}" clang) ;;
+  tidy) wanted+=("${tests[@]}" clang-tidy-19) ;;
+  *) echo "usage: $0 demos | tests [clang] | tidy" >&2; exit 2 ;;
 esac
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
@@ -22,10 +26,17 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
 fi
 
 is_installed() { [ "$(dpkg-query -W -f='${db:Status-Status}\n' "$1" 2>/dev/null | sort -u)" = installed ]; }
-missing=()
-for package in "${wanted[@]}"; do
-  is_installed "$package" || missing+=("$package")
-done
+is_offered() { [[ $(apt-cache policy "$1" 2>/dev/null) == *"Candidate: "[!\(]* ]]; }
+list_missing() {
+  missing=()
+  for package in "${wanted[@]}"; do
+    is_installed "$package" || missing+=("$package")
+  done
+  for package in "${where_offered[@]}"; do
+    is_installed "$package" || ! is_offered "$package" || missing+=("$package")
+  done
+}
+list_missing
 if [ ${#missing[@]} -eq 0 ]; then
   say "all ${#wanted[@]} packages are there"
   exit 0
@@ -49,9 +60,10 @@ apt() {  # quiet unless it fails
     exit 1
   }
 }
-say "missing: ${missing[*]}"
 say "updating the package lists"
 apt update
+list_missing  # only now is it known what is offered
+say "missing: ${missing[*]}"
 apt install --no-install-recommends --simulate "${missing[@]}"
 say "installing $(grep -c '^Inst ' "$log" || true) packages with all they depend on: some minutes"
 start=$SECONDS

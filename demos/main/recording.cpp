@@ -5,6 +5,7 @@
 #include <ctime>
 #include <sstream>
 
+#include "main/readable.h"
 #include "scenes/element_energy.h"
 
 namespace penalty::demo {
@@ -26,7 +27,7 @@ Eigen::VectorXd energy_densities(const Scene& scene, const Eigen::VectorXd& shar
 std::string failure_message(const Scene& scene, long step, Real time) {
   std::ostringstream text;
   const int particle = scene.report().first_bad_particle;
-  text << "step " << step << " (t = " << time << " s) is not finite";
+  text << "step " << step << " (t = " << readable(time) << " s) is not finite";
   if (particle >= 0) {
     text << " at particle " << particle;
     const std::span<const Tetrahedron> tetrahedra = scene.setup().body.tetrahedra();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "main/readable.h"
+
 namespace penalty::demo {
 namespace {
 
@@ -171,34 +173,37 @@ std::string describe(const std::vector<Figure>& figures) {
   std::ostringstream text;
   for (const Figure& figure : figures) {
     text << figure.name << '\n';
-    for (const Fact& fact : figure.facts) text << "  " << fact.name << ": " << fact.value << '\n';
+    for (const Fact& fact : figure.facts) text << "  " << fact.name << ": " << readable(fact.value) << '\n';
   }
   return text.str();
 }
 
 std::string describe(const Json& summary, const std::vector<Fact>& facts) {
+  const auto shown = [](const Json& number) { return number.is_null() ? "not finite" : readable(number.get<Real>()); };
   std::ostringstream text;
   const Json& mesh = summary["mesh"];
   const char* const elements = mesh["tetrahedra"] > 0 ? "tetrahedra" : "triangles";
   text << summary["scene"].get<std::string>() << ", " << summary["world"].get<std::string>() << " world, "
        << summary["precision"].get<std::string>() << ": " << mesh[elements] << ' ' << elements << " of "
        << mesh["source"].get<std::string>() << '\n'
-       << "  " << summary["steps"] << " steps, " << summary["ms_per_step"]["median"] << " ms each, "
-       << summary["substeps"]["mean"] << " substeps, " << summary["retries"] << " retries\n"
-       << "  energy [J]: " << summary["energy"]["initial"] << " at first, " << summary["energy"]["final"]
-       << " at the end, largest gain in a step " << summary["largest_energy_gain"] << '\n'
-       << "  at the end: rest error " << summary["rest_error"];
+       << "  " << summary["steps"] << " steps, " << shown(summary["ms_per_step"]["median"]) << " ms each, "
+       << shown(summary["substeps"]["mean"]) << " substeps, " << summary["retries"] << " retries\n"
+       << "  energy [J]: " << shown(summary["energy"]["initial"]) << " at first, " << shown(summary["energy"]["final"])
+       << " at the end, largest gain in a step " << shown(summary["largest_energy_gain"]) << '\n'
+       << "  at the end: rest error " << shown(summary["rest_error"]);
   if (mesh["tetrahedra"] > 0)
-    text << ", volume error " << summary["volume_error"]["mean"] << " in the mean, " << summary["inverted"]
+    text << ", volume error " << shown(summary["volume_error"]["mean"]) << " in the mean, " << summary["inverted"]
          << " inverted\n";
   else
-    text << ", length error " << summary["length_error"]["mean"] << " in the mean\n";
+    text << ", length error " << shown(summary["length_error"]["mean"]) << " in the mean\n";
   if (!summary["momentum"]["linear"].is_null())
-    text << "  momentum drift: linear " << summary["momentum"]["linear"] << ", angular "
-         << summary["momentum"]["angular"] << '\n';
-  text << "  energy ledger: " << summary["ledger"]["residual"] << " of the largest energy unexplained\n";
-  if (summary.contains("tip_drop")) text << "  tip drop [m]: " << summary["tip_drop"] << '\n';
-  for (const Fact& fact : facts) text << "  " << fact.name << ": " << fact.value << '\n';
+    text << "  momentum drift: linear " << shown(summary["momentum"]["linear"]) << ", angular "
+         << shown(summary["momentum"]["angular"]) << '\n';
+  text << "  energy ledger: " << shown(summary["ledger"]["residual"]) << " of the largest energy unexplained\n";
+  if (summary.contains("tip_drop"))
+    text << "  tip drop [m]: "
+         << (summary["tip_drop"].is_null() ? "measured between 1 and 2 s" : shown(summary["tip_drop"])) << '\n';
+  for (const Fact& fact : facts) text << "  " << fact.name << ": " << readable(fact.value) << '\n';
   if (summary.contains("runs"))
     text << "  " << summary["recovered_runs"] << " of " << summary["runs"] << " runs recovered\n";
   return text.str();

@@ -139,7 +139,7 @@ Context::Context(Backend backend, const BackendLibraries& libraries) {
   attempt(std::type_identity<OsmesaPlatform>{}, Backend::osmesa, "osmesa", libraries.osmesa);
   attempt(std::type_identity<EglPlatform>{}, Backend::egl, "egl", libraries.egl);
   if (!platform_)
-    throw std::runtime_error("no off-screen OpenGL: install libosmesa6, or libegl1 and libgl1-mesa-dri (" + answers +
+    throw std::runtime_error("no off-screen OpenGL: install libegl1 and libgl1-mesa-dri, or libosmesa6 (" + answers +
                              ")");
 }
 

@@ -10,7 +10,7 @@ namespace penalty::render {
 class GlApi;
 
 /// `automatic` tries OSMesa first: its pixels do not depend on the machine's graphics card. Mesa removed OSMesa in
-/// version 25.1, so EGL has to be there to live on.
+/// version 25.1: where it is gone, EGL takes over.
 enum class Backend { automatic, osmesa, egl };
 
 /// "auto", "osmesa" or "egl"; throws std::invalid_argument naming the three for anything else.

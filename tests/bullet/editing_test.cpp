@@ -34,7 +34,7 @@ TEST_P(Editing, AKindOfOnesOwnPullsTheBodyBackToItsRestShape) {
   const TetMesh mesh = make_ball(0.5, 3);
   PotentialField field(mesh.vertices);
   field.add<Girth>(faces_of(mesh.tetrahedra), 5);
-  btSoftBody& body = sim.add(make_soft_body(sim.info(), mesh, {}));
+  btSoftBody& body = sim.add(make_soft_body(sim.info(), mesh));
   sim.penalty().attach(body, std::move(field), {.step = {.drag = 2}});
   for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_x *= btScalar(1.05);
   sim.step(frame);
@@ -78,7 +78,7 @@ TEST_P(Editing, LedgerBalancesWhileABodyTears) {
   const TetMesh mesh = make_box({1, 0.2, 0.2}, {10, 2, 2});
   PotentialField springs(mesh.vertices);
   springs.add<Length>(edges_of(mesh.tetrahedra), 2).set_breaking({.upper = 0.4});
-  btSoftBody& body = sim.add(make_soft_body(sim.info(), mesh, {}));
+  btSoftBody& body = sim.add(make_soft_body(sim.info(), mesh));
   sim.penalty().attach(body, std::move(springs), {.step = {.safety = 0.2}});
   const Batch<Length>& batch = *sim.penalty().field(body).find<Length>();
   for (int i = 0; i < body.m_nodes.size(); ++i)

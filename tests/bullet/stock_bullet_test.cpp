@@ -18,9 +18,9 @@ constexpr Real frame = 1.0 / 60;
 class Squashed : public WorldTest {
  protected:
   // A box of Bullet's own tetrahedra, of full volume stiffness, squashed to a fifth of its height.
-  btSoftBody& add_squashed_box(Simulation& simulation, const TetMesh& mesh) {
-    auto made = make_soft_body(simulation.info(), mesh);
-    for (const Tetrahedron& t : mesh.tetrahedra) made->appendTetra(t[0], t[1], t[2], t[3]);
+  btSoftBody& add_squashed_box(Simulation& simulation, const TetMesh& box) {
+    auto made = make_soft_body(simulation.info(), box);
+    for (const Tetrahedron& t : box.tetrahedra) made->appendTetra(t[0], t[1], t[2], t[3]);
     made->m_materials[0]->m_kVST = 1;
     btSoftBody& body = simulation.add(std::move(made));
     simulation.step(frame);  // Bullet takes its rest volumes from the first step

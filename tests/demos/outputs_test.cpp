@@ -37,6 +37,18 @@ Json summary_of(const std::string& arguments) {
   return Json::parse(outcome.output);  // fails unless the JSON is alone
 }
 
+TEST(Description, HasNumbersForPeople) {
+  EXPECT_EQ(unreadable_numbers("a 14.394168999999998 ms, b 0.00012345 J, c 123.45, d 3.2e-09, e 100000"),
+            (std::vector<std::string>{"14.394168999999998", "100000"}));
+  for (const char* run : {"drop --mesh box --cells 4 --duration 0.2", "flight --duration 0.2", "beam --duration 2",
+                          "cloth --duration 0.1", "potential_field"}) {
+    const Outcome outcome = run_demo(words(std::string("run ") + run + " --no-render"));
+    EXPECT_EQ(outcome.status, 0) << outcome.errors;
+    EXPECT_GT(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 3) << outcome.output;
+    EXPECT_EQ(unreadable_numbers(outcome.output), std::vector<std::string>{}) << outcome.output;
+  }
+}
+
 TEST(Summary, HasThePromisedKeys) {
   const Json summary = summary_of("run drop --mesh box --cells 4 --stiffness 1 --duration 0.2 --seed 7");
   for (const char* key : {"scene", "world", "integrator", "precision"}) EXPECT_TRUE(summary[key].is_string()) << key;

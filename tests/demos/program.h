@@ -3,9 +3,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -56,6 +58,20 @@ inline std::vector<std::string> words(const std::string& text) {
   std::istringstream stream(text);
   std::vector<std::string> result;
   for (std::string word; stream >> word;) result.push_back(word);
+  return result;
+}
+
+/// The numbers in a text for people that have more than five significant digits.
+inline std::vector<std::string> unreadable_numbers(const std::string& text) {
+  std::vector<std::string> result;
+  const std::regex number(R"([0-9]+(\.[0-9]+)?)");
+  for (std::sregex_iterator at(text.begin(), text.end(), number), end; at != end; ++at) {
+    const std::string found = at->str();
+    const std::size_t first = std::min(found.find_first_not_of("0."), found.size());
+    const auto digits =
+        std::count_if(found.begin() + static_cast<std::ptrdiff_t>(first), found.end(), [](char c) { return c != '.'; });
+    if (digits > 5) result.push_back(found);
+  }
   return result;
 }
 

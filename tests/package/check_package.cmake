@@ -26,16 +26,28 @@ function(run_programs directory)
   endforeach()
 endfunction()
 
+# Configures, builds and runs tests/package against the package at `place`, a prefix or a build directory.
+function(use_package place)
+  set(only "")
+  list(LENGTH PRECISIONS count)
+  if(count EQUAL 1)  # else the project's own default: both
+    set(only -D PRECISIONS=${PRECISIONS})
+  endif()
+  run(${CMAKE_COMMAND} ${toolchain} -D CMAKE_PREFIX_PATH=${place} ${only} -S ${SOURCE}/tests/package -B ${scratch})
+  run(${CMAKE_COMMAND} --build ${scratch})
+  run_programs(${scratch})
+endfunction()
+
 # A project that asks for COMPONENTS and links them all.
 function(configure_with_components)
   list(JOIN COMPONENTS " " components)
   list(TRANSFORM COMPONENTS PREPEND "BulletPenalty::" OUTPUT_VARIABLE targets)
   list(JOIN targets " " targets)
   file(WRITE ${scratch}/CMakeLists.txt
-    "cmake_minimum_required(VERSION 3.22)\nproject(asks LANGUAGES CXX)\n"
-    "find_package(BulletPenalty 0.1 REQUIRED COMPONENTS ${components})\n"
-    "add_executable(asks main.cpp)\ntarget_link_libraries(asks PRIVATE ${targets})\n")
-  file(WRITE ${scratch}/main.cpp "int main() {}\n")
+    "cmake_minimum_required(VERSION 3.22)\nproject(stretched_box LANGUAGES CXX)\n"
+    "find_package(BulletPenalty 0.2 REQUIRED COMPONENTS ${components})\n"
+    "add_executable(stretched_box ${SOURCE}/tests/package/stretched_box.cpp)\n"
+    "target_link_libraries(stretched_box PRIVATE ${targets})\n")
   execute_process(COMMAND ${CMAKE_COMMAND} ${toolchain} -D CMAKE_PREFIX_PATH=${prefix} -S ${scratch} -B ${scratch}/build
                   RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
   set(status ${status} PARENT_SCOPE)
@@ -48,27 +60,59 @@ if(STEP STREQUAL "install")
   run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${scratch})
   file(RENAME ${scratch} ${prefix})
 elseif(STEP STREQUAL "find_package")
-  set(only "")
-  list(LENGTH PRECISIONS count)
-  if(count EQUAL 1)  # else the project's own default: both
-    set(only -D PRECISIONS=${PRECISIONS})
-  endif()
-  run(${CMAKE_COMMAND} ${toolchain} -D CMAKE_PREFIX_PATH=${prefix} ${only} -S ${SOURCE}/tests/package -B ${scratch})
-  run(${CMAKE_COMMAND} --build ${scratch})
-  run_programs(${scratch})
-elseif(STEP STREQUAL "add_subdirectory")
-  list(GET PRECISIONS 0 PRECISIONS)  # one precision: the whole library is compiled again
+  use_package(${prefix})
+elseif(STEP STREQUAL "build_tree")
+  use_package(${BUILD})
+elseif(STEP STREQUAL "subproject")
+  # Part of a project of other habits, which fetches us and wants shared libraries; and the installation of those.
+  list(GET PRECISIONS 0 PRECISIONS)  # the whole library is compiled again: one precision, and not optimised
+  set(module bullet)
   set(target bullet_penalty)
   if(PRECISIONS STREQUAL "float64")
+    set(module bullet-float64)
     set(target bullet_penalty-float64)
+  endif()
+  # Bullet as on systems where it names two include directories.
+  find_program(pkg_config NAMES pkg-config pkgconf REQUIRED)
+  foreach(part cflags libs modversion)
+    execute_process(COMMAND ${pkg_config} --${part} ${module} OUTPUT_VARIABLE ${part} OUTPUT_STRIP_TRAILING_WHITESPACE
+                    COMMAND_ERROR_IS_FATAL ANY)
+  endforeach()
+  file(MAKE_DIRECTORY ${scratch}/second)
+  file(WRITE ${scratch}/${module}.pc
+    "Name: Bullet\nDescription: with a second include directory\nVersion: ${modversion}\n"
+    "Cflags: -I${scratch}/second ${cflags}\nLibs: ${libs}\n")
+  set(ENV{PKG_CONFIG_PATH} ${scratch}:$ENV{PKG_CONFIG_PATH})
+  set(name jelly_box)
+  if(NOT PRECISIONS STREQUAL "float")
+    set(name jelly_box-${PRECISIONS})
   endif()
   file(WRITE ${scratch}/CMakeLists.txt
     "cmake_minimum_required(VERSION 3.22)\nproject(jelly_box LANGUAGES CXX)\n"
-    "add_subdirectory(${SOURCE} bullet_penalty)\n"
-    "add_executable(jelly_box jelly_box.cpp)\ntarget_link_libraries(jelly_box PRIVATE BulletPenalty::${target})\n")
-  file(COPY ${SOURCE}/tests/package/jelly_box.cpp DESTINATION ${scratch})
-  run(${CMAKE_COMMAND} ${toolchain} -D BULLET_PENALTY_PRECISIONS=${PRECISIONS} -S ${scratch} -B ${scratch}/build)
-  # Generated, not built: compiling the library a second time would be most of this test suite's time.
+    "set(CMAKE_CXX_STANDARD 17)\nset(CMAKE_CXX_VISIBILITY_PRESET hidden)\n"
+    "include(FetchContent)\nFetchContent_Declare(BulletPenalty SOURCE_DIR ${SOURCE})\n"
+    "FetchContent_MakeAvailable(BulletPenalty)\n"
+    "if(CMAKE_BUILD_TYPE)\n  message(FATAL_ERROR \"BulletPenalty has chosen a build type for us\")\nendif()\n"
+    "add_executable(${name} ${SOURCE}/tests/package/jelly_box.cpp)\n"
+    "target_link_libraries(${name} PRIVATE BulletPenalty::${target})\n")
+  run(${CMAKE_COMMAND} -G ${GENERATOR} -D CMAKE_CXX_COMPILER=${COMPILER} -D "CMAKE_CXX_FLAGS=${FLAGS} -O0"
+      -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -D CMAKE_INSTALL_LIBDIR=${LIBDIR} -D BUILD_SHARED_LIBS=ON
+      -D BULLET_PENALTY_INSTALL=ON -D BULLET_PENALTY_PRECISIONS=${PRECISIONS} -S ${scratch} -B ${scratch}/build)
+  if(EXISTS ${scratch}/build/compile_commands.json)
+    message(FATAL_ERROR "BulletPenalty has asked for compile commands on behalf of the project around it")
+  endif()
+  run(${CMAKE_COMMAND} --build ${scratch}/build)
+  run_programs(${scratch}/build)
+  run(${CMAKE_COMMAND} --install ${scratch}/build --prefix ${scratch}/first)
+  file(RENAME ${scratch}/first ${scratch}/prefix)
+  file(REMOVE_RECURSE ${scratch}/build)
+  file(GLOB archives ${scratch}/prefix/${LIBDIR}/*.a)
+  if(archives)
+    message(FATAL_ERROR "BUILD_SHARED_LIBS left static libraries: ${archives}")
+  endif()
+  set(place ${scratch}/prefix)
+  set(scratch ${scratch}/stranger)
+  use_package(${place})
 elseif(STEP STREQUAL "pkg_config")
   find_program(pkg_config NAMES pkg-config pkgconf REQUIRED)
   set(module bullet-penalty)
@@ -91,6 +135,7 @@ elseif(STEP STREQUAL "accepted")
     message(FATAL_ERROR "components ${COMPONENTS} were refused:\n${output}")
   endif()
   run(${CMAKE_COMMAND} --build ${scratch}/build)
+  run(${scratch}/build/stretched_box)
 elseif(STEP STREQUAL "refused")
   configure_with_components()
   string(REGEX REPLACE "[ \n]+" " " words "${output}")  # CMake breaks the message into lines

@@ -23,12 +23,12 @@ int main() {
   world.addRigidBody(&ground);
 
   penalty::TetMesh mesh = penalty::make_box({1, 1, 1}, {3, 3, 3});
-  penalty::PotentialField field =
-      penalty::make_elastic_field(mesh.vertices, mesh.tetrahedra, penalty::Material{.young = 2e4, .density = 100});
+  const penalty::Material foam{.young = 2e4, .density = 100, .damping = 0.01};
+  penalty::PotentialField field = penalty::make_elastic_field(mesh.vertices, mesh.tetrahedra, foam);
   mesh.vertices.row(1).array() += 0.5;  // the start, half a metre above the ground
-  const auto body = penalty::make_soft_body(world.getWorldInfo(), mesh, {.mass = 100});
+  const auto body = penalty::make_soft_body(world.getWorldInfo(), mesh, foam);
   world.addSoftBody(body.get());
-  solver.attach(*body, std::move(field), {.step = {.damping_time = 0.01}});
+  solver.attach(*body, std::move(field));
 
   for (int step = 0; step < 120; ++step) world.stepSimulation(1.f / 60, 0);
 
@@ -38,7 +38,6 @@ int main() {
   const bool stands =
       heights.minCoeff() > -0.05 && heights.minCoeff() < 0.1 && heights.maxCoeff() > 0.8 && heights.maxCoeff() < 1.1;
 
-  solver.detach(*body);
   world.removeSoftBody(body.get());
   world.removeRigidBody(&ground);
   return stands ? 0 : 1;

@@ -17,10 +17,11 @@ function(package_test name step)
   add_test(NAME package.${name} COMMAND ${CMAKE_COMMAND}
     -D STEP=${step} -D BUILD=${PROJECT_BINARY_DIR} -D SOURCE=${PROJECT_SOURCE_DIR} -D WORK=${penalty_package_work}
     -D NAME=${name} -D PRECISIONS=${precisions} -D GENERATOR=${CMAKE_GENERATOR} -D COMPILER=${CMAKE_CXX_COMPILER}
-    -D BUILD_TYPE=${CMAKE_BUILD_TYPE} -D FLAGS=${CMAKE_CXX_FLAGS} -D LIBDIR=${CMAKE_INSTALL_LIBDIR} ${ARGN}
+    -D BUILD_TYPE=${CMAKE_BUILD_TYPE} -D FLAGS=${CMAKE_CXX_FLAGS} -D LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}
+    -D LIBDIR=${CMAKE_INSTALL_LIBDIR} ${ARGN}
     -P ${PROJECT_SOURCE_DIR}/tests/package/check_package.cmake)
   set_tests_properties(package.${name} PROPERTIES TIMEOUT 900)
-  if(NOT step STREQUAL "install" AND NOT step STREQUAL "add_subdirectory")
+  if(NOT step STREQUAL "install" AND NOT step MATCHES "^(subproject|build_tree)$")
     set_tests_properties(package.${name} PROPERTIES FIXTURES_REQUIRED installed_package)
   endif()
 endfunction()
@@ -30,7 +31,11 @@ if(TEST package.install)
   set_tests_properties(package.install PROPERTIES FIXTURES_SETUP installed_package)
 endif()
 package_test(find_package find_package)
-package_test(add_subdirectory add_subdirectory)
+package_test(build_tree build_tree)
+package_test(subproject subproject)
+if(TEST package.subproject)
+  set_tests_properties(package.subproject PROPERTIES TIMEOUT 2700)  # compiles the library once more
+endif()
 foreach(precision IN LISTS penalty_precisions)
   package_test(pkg_config_${precision} pkg_config -D PRECISION=${precision})
 endforeach()
@@ -48,3 +53,25 @@ foreach(precision float float64)
                  -D "MESSAGE=built without the component '${precision}'")
   endif()
 endforeach()
+
+# Every program is linked from these; those of one precision of Bullet only, as no program has both.
+foreach(suffix "" "-float64")
+  if(TARGET bullet_penalty${suffix})
+    set(penalty_libraries "")
+    foreach(target penalty_core penalty_mesh penalty_surface bullet_penalty${suffix} penalty_render penalty_scene_setups
+                   penalty_scenes${suffix} penalty_program penalty_demo_program penalty_study_program)
+      if(TARGET ${target})
+        list(APPEND penalty_libraries $<TARGET_FILE:${target}>)
+      endif()
+    endforeach()
+    add_test(NAME package.symbols${suffix}
+             COMMAND bash ${PROJECT_SOURCE_DIR}/tests/package/symbols.sh ${penalty_libraries})
+  endif()
+endforeach()
+
+# What applications include leaves the insides of the solver alone: they cost each of their sources time to compile.
+if(TARGET bullet_penalty)
+  add_test(NAME package.headers COMMAND ${CMAKE_COMMAND} -D COMPILER=${CMAKE_CXX_COMPILER}
+    -D "INCLUDES=$<TARGET_PROPERTY:bullet_penalty,INCLUDE_DIRECTORIES>"
+    -P ${PROJECT_SOURCE_DIR}/tests/package/check_headers.cmake)
+endif()

@@ -1,10 +1,14 @@
 // Small scenes and pixel statistics for the tests of the renderer.
 #pragma once
+#include <dlfcn.h>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "render/renderer.h"
@@ -17,6 +21,13 @@ inline constexpr int width = 320, height = 180;
 inline RendererOptions options_for(Backend backend, int samples = 1) {
   setenv("LP_NUM_THREADS", "1", 0);
   return {.backend = backend, .width = width, .height = height, .samples = samples};
+}
+
+/// Of Mesa 25.1 and later. The library stays loaded: the renderer leaves it so, too.
+inline bool osmesa_is_gone() {
+  const std::vector<std::string> names = BackendLibraries{}.osmesa;
+  return std::none_of(names.begin(), names.end(),
+                      [](const std::string& name) { return dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL); });
 }
 
 /// A sphere of 2 * 24 * 48 triangles, seen from outside counter-clockwise.

@@ -178,6 +178,7 @@ TEST(StudyTable, SaysTheSameAsJsonAndDrawsIt) {
     EXPECT_LE(row["rate_low"], row["rate"]);
     EXPECT_GE(row["rate_high"], row["rate"]);
   }
+  EXPECT_EQ(unreadable_numbers(output_of({"table", out, "--times"})), std::vector<std::string>{});
   EXPECT_TRUE(Json::parse(output_of({"table", out, "--json", "--times"}))[0].contains("median_cpu_seconds_to_recover"));
   EXPECT_EQ(output_of({"plot", out, "--out", (directory / "rates.png").string()}), "");
   EXPECT_EQ(contents(directory / "rates.png").substr(1, 3), "PNG");
@@ -187,6 +188,7 @@ TEST(StudyStability, FindsNothingThatGrows) {
   const std::string table = output_of({"stability", "--time", "0.1"});
   EXPECT_NE(table.find("finite"), std::string::npos);
   EXPECT_EQ(table.find("NO"), std::string::npos);
+  EXPECT_EQ(unreadable_numbers(table), std::vector<std::string>{}) << table;
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 2 + 11 * 3 + 1 + 2 + 5);
 }
 

@@ -12,14 +12,20 @@
 namespace penalty {
 namespace {
 
+Real mass_of(const SoftBodyOptions& options) { return options.mass.value_or(1); }
+
+void require(bool ok, const char* name, Real value, const char* range) {
+  if (!ok)
+    throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " + range);
+}
+
+bool is_positive(Real value) { return value > 0 && std::isfinite(value); }
+bool is_positive_or_zero(Real value) { return value >= 0 && std::isfinite(value); }
+
 void check(const Eigen::Matrix3Xd& vertices, const SoftBodyOptions& options) {
-  const auto require = [](bool ok, const char* name, Real value, const char* range) {
-    if (!ok)
-      throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " + range);
-  };
-  require(options.mass > 0 && std::isfinite(options.mass), "mass", options.mass, "positive and finite [kg]");
-  require(options.margin >= 0 && std::isfinite(options.margin), "margin", options.margin, "zero or positive [m]");
-  require(options.friction >= 0 && std::isfinite(options.friction), "friction", options.friction, "zero or positive");
+  require(is_positive(mass_of(options)), "mass", mass_of(options), "positive and finite [kg]");
+  require(is_positive_or_zero(options.margin), "margin", options.margin, "zero or positive [m]");
+  require(is_positive_or_zero(options.friction), "friction", options.friction, "zero or positive");
   const auto num_vertices = static_cast<int>(vertices.cols());
   if (num_vertices == 0) throw std::invalid_argument("soft body: the mesh has no vertices");
   for (const int node : options.pinned)
@@ -28,21 +34,49 @@ void check(const Eigen::Matrix3Xd& vertices, const SoftBodyOptions& options) {
                                   std::to_string(num_vertices) + " vertices");
 }
 
-/// Equal masses, or each element's share of `options.mass`, by its size, divided among its nodes. `element` is the word for
+/// `element` is the word for one in messages.
+template <std::size_t N>
+void check_indices(const Eigen::Matrix3Xd& vertices, const std::vector<std::array<int, N>>& elements,
+                   const char* element) {
+  for (std::size_t e = 0; e < elements.size(); ++e)
+    for (const int node : elements[e])
+      if (node < 0 || node >= vertices.cols())
+        throw std::invalid_argument(std::string("soft body: ") + element + " " + std::to_string(e) + ": vertex index " +
+                                    std::to_string(node) + " is outside the " + std::to_string(vertices.cols()) +
+                                    " vertices");
+}
+
+/// The options with the mass that the material gives to elements of these volumes.
+SoftBodyOptions with_density(SoftBodyOptions options, const Material& material, Real volume) {
+  if (options.mass)
+    throw std::invalid_argument("soft body: mass is " + to_text(*options.mass) +
+                                " kg, but the density of the material decides: leave one of them out");
+  require(is_positive(material.density), "density", material.density, "positive and finite [kg/m³]");
+  require(is_positive(volume), "volume", volume, "positive and finite [m³] for a mass by density");
+  options.mass = material.density * volume;
+  return options;
+}
+
+Real sum_of_sizes(const std::vector<Real>& sizes) {
+  Real sum = 0;
+  for (const Real size : sizes) sum += std::abs(size);
+  return sum;
+}
+
+/// Equal masses, or each element's share of the mass, by its size, divided among its nodes. `element` is the word for
 /// one in messages.
 template <std::size_t N>
 std::vector<Real> node_masses(int num_vertices, const std::vector<std::array<int, N>>& elements,
                               const std::vector<Real>& sizes, const char* element, const SoftBodyOptions& options) {
   if (options.equal_masses)
-    return std::vector<Real>(static_cast<std::size_t>(num_vertices), options.mass / static_cast<Real>(num_vertices));
+    return std::vector<Real>(static_cast<std::size_t>(num_vertices),
+                             mass_of(options) / static_cast<Real>(num_vertices));
   std::vector<Real> masses(static_cast<std::size_t>(num_vertices), 0);
-  Real total = 0;
-  for (std::size_t e = 0; e < sizes.size(); ++e) {
-    total += std::abs(sizes[e]);
+  const Real total = sum_of_sizes(sizes);
+  for (std::size_t e = 0; e < sizes.size(); ++e)
     for (const int node : elements[e]) masses[node] += std::abs(sizes[e]) / N;
-  }
   for (std::size_t i = 0; i < masses.size(); ++i) {
-    masses[i] *= options.mass / total;
+    masses[i] *= mass_of(options) / total;
     if (!(masses[i] > 0))
       throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + to_text(masses[i]) +
                                   " kg: no " + element + " of the mesh holds it");
@@ -75,6 +109,7 @@ std::unique_ptr<btSoftBody> assemble(btSoftBodyWorldInfo& world_info, const Eige
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
                                            const SoftBodyOptions& options) {
   check(mesh.vertices, options);
+  check_indices(mesh.vertices, mesh.tetrahedra, "tetrahedron");
   return assemble(world_info, mesh.vertices, boundary_faces(mesh.tetrahedra),
                   options.stock_deformable ? edges_of(mesh.tetrahedra) : std::vector<Edge>{},
                   node_masses(static_cast<int>(mesh.vertices.cols()), mesh.tetrahedra,
@@ -82,21 +117,30 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
                   options);
 }
 
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const Material& material, const SoftBodyOptions& options) {
+  check_indices(mesh.vertices, mesh.tetrahedra, "tetrahedron");
+  const Real volume = sum_of_sizes(signed_volumes(mesh.vertices, mesh.tetrahedra));
+  return make_soft_body(world_info, mesh, with_density(options, material, volume));
+}
+
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
                                            const SoftBodyOptions& options) {
   check(surface.vertices, options);
-  const auto num_vertices = static_cast<int>(surface.vertices.cols());
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
-    for (const int node : surface.triangles[t])
-      if (node < 0 || node >= num_vertices)
-        throw std::invalid_argument("soft body: triangle " + std::to_string(t) + ": vertex index " +
-                                    std::to_string(node) + " is outside the " + std::to_string(num_vertices) +
-                                    " vertices");
-  return assemble(
-      world_info, surface.vertices, surface.triangles,
-      options.stock_deformable ? edges_of(surface.triangles) : std::vector<Edge>{},
-      node_masses(num_vertices, surface.triangles, areas_of(surface.vertices, surface.triangles), "triangle", options),
-      options);
+  check_indices(surface.vertices, surface.triangles, "triangle");
+  return assemble(world_info, surface.vertices, surface.triangles,
+                  options.stock_deformable ? edges_of(surface.triangles) : std::vector<Edge>{},
+                  node_masses(static_cast<int>(surface.vertices.cols()), surface.triangles,
+                              areas_of(surface.vertices, surface.triangles), "triangle", options),
+                  options);
+}
+
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
+                                           const Material& material, Real thickness, const SoftBodyOptions& options) {
+  check_indices(surface.vertices, surface.triangles, "triangle");
+  require(is_positive(thickness), "thickness", thickness, "positive and finite [m]");
+  const Real area = sum_of_sizes(areas_of(surface.vertices, surface.triangles));
+  return make_soft_body(world_info, surface, with_density(options, material, area * thickness));
 }
 
 }  // namespace penalty

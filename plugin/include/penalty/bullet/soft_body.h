@@ -1,8 +1,10 @@
 // Bullet soft bodies from tetrahedral meshes and from surfaces.
 #pragma once
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "penalty/energy/material.h"
 #include "penalty/mesh/tet_mesh.h"
 #include "penalty/mesh/triangle_surface.h"
 
@@ -12,7 +14,7 @@ struct btSoftBodyWorldInfo;
 namespace penalty {
 
 struct SoftBodyOptions {
-  Real mass = 1;             // of the whole body [kg]
+  std::optional<Real> mass = {};  // of the whole body [kg]; 1 kg, unless a material decides
   bool equal_masses = true;  // else each node carries its share of the volume or area; equal ones allow larger substeps
   std::vector<int> pinned = {};  // nodes of zero inverse mass
   Real margin = 0.02;            // collision margin [m]
@@ -28,8 +30,18 @@ struct SoftBodyOptions {
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
                                            const SoftBodyOptions& options = {});
 
+/// Its mass is the density of the material times the volume of the mesh as it is now: make the body from the rest shape, and
+/// move it then. `options.mass` is another answer to the same question, and refused. Stiffness is the field's business.
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const Material& material, const SoftBodyOptions& options = {});
+
 /// The same from the triangles of a surface, open (cloth) or closed (a balloon): they become the faces, as they are.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
+                                           const SoftBodyOptions& options = {});
+
+/// Its mass is the density of the material times area times `thickness` [m]; what a closed surface encloses weighs nothing.
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
+                                           const Material& material, Real thickness,
                                            const SoftBodyOptions& options = {});
 
 }  // namespace penalty

@@ -1,0 +1,18 @@
+# cmake -D COMPILER=... -D INCLUDES=... -P check_headers.cmake, in a scratch directory: which headers
+# <penalty/bullet_penalty.h> brings along.
+cmake_minimum_required(VERSION 3.22)
+list(REMOVE_ITEM INCLUDES "")
+list(TRANSFORM INCLUDES PREPEND "-I")
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/headers.cpp "#include <penalty/bullet_penalty.h>\n")
+execute_process(COMMAND ${COMPILER} -std=c++20 ${INCLUDES} -M ${CMAKE_CURRENT_BINARY_DIR}/headers.cpp OUTPUT_VARIABLE dependencies COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX MATCHALL "penalty/[a-z_0-9/]+\\.h" headers "${dependencies}")
+list(LENGTH headers count)
+message(STATUS "${count} headers of bullet-penalty")
+if(NOT "penalty/bullet_penalty.h" IN_LIST headers)
+  message(FATAL_ERROR "the compiler did not list the header itself:\n${dependencies}")
+endif()
+foreach(inside stepping/newton.h stepping/linear_solver.h)
+  if("penalty/${inside}" IN_LIST headers)
+    message(FATAL_ERROR "<penalty/bullet_penalty.h> brings penalty/${inside} along")
+  endif()
+endforeach()
