@@ -1,6 +1,6 @@
 // The damping of a batch: part of batch.h.
 #pragma once
-#include "penalty/assembly/batch.h"
+#include "penalty/fields/batch.h"
 
 namespace penalty {
 

@@ -1,6 +1,6 @@
 // The second derivatives of a batch: part of batch.h.
 #pragma once
-#include "penalty/assembly/batch.h"
+#include "penalty/fields/batch.h"
 
 namespace penalty {
 
