@@ -53,7 +53,8 @@ int AttachedBodies::World::couple(std::vector<CouplingPoint> points, PotentialFi
   }
   if (!any_soft)
     throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
-  auto coupling = std::make_unique<AttachedCoupling>(next_coupling_++, std::move(points), std::move(field));
+  auto coupling =
+      std::make_unique<AttachedCoupling>(AttachedCoupling{next_coupling_++, std::move(points), std::move(field), {}});
   coupling->stepped.potential = &coupling->field;
   coupling->stepped.damping_time = damping_time;
   coupling->stepped.points.resize(coupling->points.size());

@@ -50,6 +50,8 @@ struct EigenFlags {
   static const char same_as_in_the_library;
 };
 using OwnEigenFlags = EigenFlags<EIGEN_MAX_ALIGN_BYTES, EIGEN_MALLOC_ALREADY_ALIGNED != 0>;
+template <>
+const char OwnEigenFlags::same_as_in_the_library;  // defined in the library, for its flags alone
 [[gnu::used]] inline const char* const eigen_flags = &OwnEigenFlags::same_as_in_the_library;
 
 }  // namespace detail
