@@ -85,6 +85,15 @@ TEST_F(ReadSurface, NamesFromTheFileCannotDisturbAMessage) {
       "a.ply:11: vertex 0: " + std::string(40, 'n') + "... is 'what', not a number");
 }
 
+TEST_F(ReadSurface, WhatAssimpQuotesCannotDisturbAMessage) {
+  const std::string endless(5000, 'p');
+  const std::string text = complaint("a.stl", replaced(stl_ascii(), "vertex 0 0 0", "vertex 0 0 \x1b\xc3" + endless));
+  EXPECT_EQ(text.substr(0, 7), "a.stl: ");
+  EXPECT_NE(text.find("ppp"), text.npos) << text;
+  EXPECT_LT(text.size(), 220u) << text;
+  for (char c : text) EXPECT_TRUE(c >= ' ' && c < '\x7f') << text;
+}
+
 TEST_F(ReadSurface, ABinaryStlThatClaimsTooManyTrianglesIsRefused) {
   std::string bytes = stl_binary();
   bytes.replace(80, 4, "\xff\xff\xff\x7f");

@@ -50,8 +50,7 @@ std::string lower_case(std::string_view text) {
 
 std::string lower_extension(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
 
-std::string printable(std::string_view text) {
-  constexpr std::size_t longest = 40;
+std::string printable(std::string_view text, std::size_t longest) {
   std::string shown(text.substr(0, longest));
   for (char& c : shown)
     if (c < ' ' || c >= '\x7f') c = '?';
