@@ -4,12 +4,13 @@
 #include <cmath>
 #include <sstream>
 
+#include "main/decimal.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
 namespace {
 
-constexpr Real most_steps = 1e7, highest_rate = 1e6;
+constexpr Real most_steps = 1e7, lowest_rate = 1e-3, highest_rate = 1e6;
 
 std::string scene_list() {
   std::ostringstream text;
@@ -113,6 +114,8 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_flag("--no-render", no_render, "No pictures: needs no OpenGL");
   run->add_option("--summary", options.summary, "Where the summary goes as JSON; -: alone on standard output")
       ->type_name("FILE");
+  read_as_decimal(*run, {"--cells", "--stiffness", "--young", "--poisson", "--phases", "--damping", "--drag",
+                         "--substeps", "--spheres", "--seed", "--seeds", "--rate", "--duration", "--still"});
 
   try {
     app.parse(argc, argv);
@@ -140,8 +143,8 @@ CommandLine parse(int argc, const char* const* argv) {
     options.coloring = coloring == "energy" ? Coloring::energy : Coloring::strain;
   }
 
-  require(options.rate > 0 && options.rate <= highest_rate, "--rate", options.rate,
-          "positive and at most " + shown(highest_rate) + " Hz");
+  require(options.rate >= lowest_rate && options.rate <= highest_rate, "--rate", options.rate,
+          shown(lowest_rate) + " to " + shown(highest_rate) + " Hz");
   require_positive(options.duration, "--duration");
   require_positive(scene.stiffness, "--stiffness");
   require_positive(scene.young, "--young");

@@ -67,8 +67,8 @@ void hand_out(const nlohmann::ordered_json& summary, const std::string& descript
   if (options.summary == "-") std::cout << text << std::flush;
   if (!options.summary) std::cout << description << std::flush;
   if (options.out && !(std::ofstream(*options.out / "summary.json") << text << std::flush))
-    throw std::runtime_error((*options.out / "summary.json").string() + ": cannot be written");
-  if (file && !*file) throw std::runtime_error(*options.summary + ": cannot be written");
+    throw UsageError("--out " + options.out->string() + ": summary.json cannot be written");
+  if (file && !*file) throw UsageError("--summary " + *options.summary + ": cannot be written");
 }
 
 Status run_figures(const SceneEntry& entry, const RunOptions& options) {
@@ -147,7 +147,9 @@ Status run(RunOptions options) {
 int main(int argc, char** argv) try {
   CommandLine command_line = parse(argc, argv);
   std::cout << command_line.text << std::flush;
-  return command_line.run ? run(std::move(*command_line.run)) : done;
+  const Status status = command_line.run ? run(std::move(*command_line.run)) : done;
+  if (!std::cout) throw UsageError("standard output cannot be written");
+  return status;
 } catch (const UsageError& error) {
   std::cerr << "penalty-demo: " << error.what() << '\n';
   return misused;

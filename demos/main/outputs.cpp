@@ -4,8 +4,8 @@
 #include <cctype>
 #include <cmath>
 #include <fstream>
-#include <stdexcept>
 
+#include "main/usage_error.h"
 #include "render/plot.h"
 
 namespace penalty::demo {
@@ -48,7 +48,7 @@ void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>&
     file << '\n';
   }
   file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+  if (!file) throw UsageError(path.string() + ": cannot be written");
 }
 
 void write_energy_plot(const std::filesystem::path& path, const std::string& title,

@@ -77,6 +77,8 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, const Y
 BodyMesh plastic_body(const SceneOptions& options) {
   refuse_mesh(options, "plastic");
   refuse_model(options, "plastic");
+  if (options.phases.value_or(1) != 1)
+    throw std::invalid_argument("scene plastic is about springs that flow: --phases 2 does not apply");
   const int cells = cells_in(options, 20, 4, 60), upright = std::max(2, 3 * cells / 8);
   TetMesh block = make_box({width, height, width}, {cells, upright, cells});
   block.vertices.colwise() += Vector3(-width / 2, clearance, -width / 2);

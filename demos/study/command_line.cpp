@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "main/decimal.h"
 #include "study/study_materials.h"
 
 namespace penalty::study {
@@ -91,6 +92,8 @@ CommandLine parse(int argc, const char* const* argv) {
   plot->add_option("results", paths, "Directories or files of results")->required()->type_name("DIR|FILE");
   plot->add_option("--out", out, "The picture")->required()->type_name("FILE.png");
   stability->add_option("--time", time, "Simulated time of every flight and chain [s]; else 2 and 10")->type_name("S");
+  demo::read_as_decimal(*run, {"--jobs", "--seeds", "--time"});
+  demo::read_as_decimal(*stability, {"--time"});
 
   try {
     app.parse(argc, argv);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "main/usage_error.h"
 #include "render/canvas.h"
 #include "render/rasterize.h"
 #include "render/renderer.h"
@@ -125,7 +126,7 @@ void draw(Canvas& canvas, const std::vector<PlotRow>& rows) {
 void write_rate_plot(const std::filesystem::path& path, const std::vector<TableRow>& table) {
   if (path.extension() != ".png") throw std::invalid_argument(path.string() + " does not end in .png");
   const std::vector<PlotRow> rows = plot_rows(table);
-  if (rows.empty()) throw std::invalid_argument("no results to draw");
+  if (rows.empty()) throw demo::UsageError("no results to draw");
   const float units = head + heading_height * static_cast<float>(num_suites(rows)) +
                       row_height * static_cast<float>(rows.size()) + foot;
   // A canvas shrinks with a low picture: one of the usual height or more does not, and what is too much of it is cut

@@ -12,6 +12,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "main/usage_error.h"
+
 namespace penalty::study {
 namespace {
 
@@ -38,7 +40,7 @@ std::vector<fs::path> result_files(const std::vector<fs::path>& paths) {
 std::string contents(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (!file || fs::is_directory(path)) throw std::runtime_error(path.string() + ": cannot be read");
+  if (!file || fs::is_directory(path)) throw demo::UsageError(path.string() + ": cannot be read");
   return text;
 }
 
@@ -52,7 +54,7 @@ std::vector<StudyResult> read_results(const std::vector<fs::path>& paths) {
     for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1, ++line) try {
         results.push_back(from_line(text.substr(begin, end - begin)));
       } catch (const std::runtime_error& error) {
-        throw std::runtime_error(path.string() + ":" + std::to_string(line) + ": " + error.what());
+        throw demo::UsageError(path.string() + ":" + std::to_string(line) + ": " + error.what());
       }
   }
   return results;
@@ -72,7 +74,7 @@ std::vector<StudyResult> merged(const std::vector<StudyResult>& results) {
 }
 
 ResultFile::ResultFile(const fs::path& directory, int shard, int num_shards) {
-  const auto fail = [&](const std::string& what) { throw std::runtime_error(path_.string() + ": " + what); };
+  const auto fail = [&](const std::string& what) { throw demo::UsageError(path_.string() + ": " + what); };
   std::error_code error;
   fs::create_directories(directory, error);
   path_ = directory / ("results-" + std::to_string(shard) + "-of-" + std::to_string(num_shards) + ".jsonl");

@@ -61,6 +61,9 @@ TEST(CommandLine, RefusesImpossibleNumbers) {
                                Misuse{"--seeds 0", "--seeds"},
                                Misuse{"--cells 0", "--cells"},
                                Misuse{"--cells 100000", "--cells"},
+                               Misuse{"--cells 0x10", "0x10"},
+                               Misuse{"--stiffness 0x10", "0x10"},
+                               Misuse{"--rate 1e-300 --duration 1e300", "--rate"},
                                Misuse{"--still -1", "--still"}}) {
     SCOPED_TRACE(misuse.arguments);
     expect_refusal(run_demo(words("run drop --mesh torus --no-render " + std::string(misuse.arguments))),
@@ -74,6 +77,7 @@ TEST(CommandLine, RefusesImpossibleNumbers) {
   expect_refusal(run_demo(words("run tear --model springs")), "--model");
   expect_refusal(run_demo(words("run balloon --stiffness 1")), "--stiffness");
   expect_refusal(run_demo(words("run plastic --start squash")), "rest");
+  expect_refusal(run_demo(words("run plastic --phases 2")), "--phases");
   expect_refusal(run_demo(words("run beam --model neo-hookean --stiffness 1")), "excludes");
   expect_refusal(run_demo(words("run beam --model springs+areas --poisson 0.26")), "oisson");
 }
@@ -81,6 +85,19 @@ TEST(CommandLine, RefusesImpossibleNumbers) {
 TEST(CommandLine, RefusesPlacesThatCannotBeWritten) {
   expect_refusal(run_demo(words("run flight --mesh box --no-render --out /dev/null/x")), "/dev/null/x");
   expect_refusal(run_demo(words("run flight --mesh box --no-render --summary /no/such/place")), "/no/such/place");
+  const std::string short_run = "run flight --mesh box --cells 2 --duration 0.02 --no-render --summary ";
+  expect_refusal(run_demo(words(short_run + "/dev/full")), "/dev/full");
+  // The shell opens what it is told last.
+  const Outcome full = run_program("sh", {"-c", PENALTY_DEMO " list >/dev/full"});
+  EXPECT_EQ(full.status, 2);
+  EXPECT_EQ(full.errors, "penalty-demo: standard output cannot be written\n");
+}
+
+TEST(CommandLine, LeadingZerosDoNotMakeANumberOctal) {
+  const Outcome outcome = run_demo(words("run flight --mesh box --cells 010 --duration 0.02 --no-render --summary -"));
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  const Outcome ten = run_demo(words("run flight --mesh box --cells 10 --duration 0.02 --no-render --summary -"));
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["mesh"], nlohmann::json::parse(ten.output)["mesh"]);
 }
 
 TEST(CommandLine, RefusesBrokenMeshes) {

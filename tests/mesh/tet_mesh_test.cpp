@@ -59,7 +59,7 @@ TEST(Repair, NamesWhatItRefuses) {
             }),
             "made: tetrahedron 1: same four vertices as tetrahedron 0");
   EXPECT_EQ(complaint([](TetMesh& m) { m.vertices.col(4) << 2, 2, 0; }),
-            "made: tetrahedron 1: flat: volume 0 at a longest edge of 2.8284271247461903");
+            "made: tetrahedron 1: flat: volume 0 at a longest edge of 2.82843");
   EXPECT_EQ(invalid_argument([] {
               TetMesh empty;
               repair(empty);

@@ -36,7 +36,7 @@ TEST_F(WriteVtk, ScalarsFollowTheMesh) {
   write_vtk(folder() / "a.vtk", mesh, at_vertices, at_tetrahedra);
   std::ifstream stream(folder() / "a.vtk");
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  EXPECT_NE(text.find("POINT_DATA 5\nSCALARS heat double 1\nLOOKUP_TABLE default\n1\n2\n3\n4\n0.10000000000000001\n"
+  EXPECT_NE(text.find("POINT_DATA 5\nSCALARS heat double 1\nLOOKUP_TABLE default\n1\n2\n3\n4\n0.1\n"
                       "CELL_DATA 2\nSCALARS strain double 1\nLOOKUP_TABLE default\n-1\n1"),
             text.npos)
       << text;

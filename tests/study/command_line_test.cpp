@@ -23,11 +23,12 @@ TEST(StudyCommandLine, RefusesImpossibleRuns) {
   const TemporaryDirectory directory;
   for (const Misuse& misuse :
        {Misuse{"--suite slow", "static, rates, world, speed, quick"}, Misuse{"--suite quick --jobs 0", "--jobs"},
-        Misuse{"--suite quick --jobs many", "many"}, Misuse{"--suite quick --shard 0/4", "0/4"},
-        Misuse{"--suite quick --shard 5/4", "5/4"}, Misuse{"--suite quick --shard 1", "I/N"},
-        Misuse{"--suite quick --shard 1/2/3", "I/N"}, Misuse{"--suite quick --shard a/b", "I/N"},
-        Misuse{"--suite quick --seeds 0", "--seeds"}, Misuse{"--suite quick --time -1", "--time"},
-        Misuse{"--suite static --time 3", "does not apply"}, Misuse{"--suite quick --mesh ball", "does not apply"},
+        Misuse{"--suite quick --jobs many", "many"}, Misuse{"--suite quick --jobs 0x1", "0x1"},
+        Misuse{"--suite quick --shard 0/4", "0/4"}, Misuse{"--suite quick --shard 5/4", "5/4"},
+        Misuse{"--suite quick --shard 1", "I/N"}, Misuse{"--suite quick --shard 1/2/3", "I/N"},
+        Misuse{"--suite quick --shard a/b", "I/N"}, Misuse{"--suite quick --seeds 0", "--seeds"},
+        Misuse{"--suite quick --time -1", "--time"}, Misuse{"--suite static --time 3", "does not apply"},
+        Misuse{"--suite quick --mesh ball", "does not apply"},
         Misuse{"--suite world --mesh dragon.vtk", "dragon.vtk"}}) {
     SCOPED_TRACE(misuse.arguments);
     std::vector<std::string> arguments = words("run " + std::string(misuse.arguments));
@@ -40,12 +41,12 @@ TEST(StudyCommandLine, RefusesImpossibleRuns) {
 TEST(StudyCommandLine, SaysWhatFilesCannotBeUsed) {
   const TemporaryDirectory directory;
   std::ofstream(directory / "file") << "no directory\n";
-  expect_error(run_study({"run", "--suite", "quick", "--out", (directory / "file").string()}), 1,
+  expect_error(run_study({"run", "--suite", "quick", "--out", (directory / "file").string()}), 2,
                "results-1-of-1.jsonl");
   std::ofstream(directory / "results-1-of-1.jsonl") << "{}\n";
-  expect_error(run_study({"table", directory.path().string()}), 1, "results-1-of-1.jsonl:1: ");
+  expect_error(run_study({"table", directory.path().string()}), 2, "results-1-of-1.jsonl:1: ");
   std::ofstream(directory / "results-1-of-1.jsonl") << "";
-  expect_error(run_study({"plot", directory.path().string(), "--out", (directory / "x.png").string()}), 1,
+  expect_error(run_study({"plot", directory.path().string(), "--out", (directory / "x.png").string()}), 2,
                "no results");
 }
 

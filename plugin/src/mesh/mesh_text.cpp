@@ -50,18 +50,14 @@ std::string lower_case(std::string_view text) {
 
 std::string lower_extension(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
 
-std::string to_text(Real value) {
-  char digits[32];
-  const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
-  return {digits, end};
+std::string printable(std::string_view text, std::size_t longest) {
+  std::string shown(text.substr(0, longest));
+  for (char& c : shown)
+    if (c < ' ' || c >= '\x7f') c = '?';
+  return text.size() > longest ? shown + "..." : shown;
 }
 
-std::string in_quotes(std::string_view text) {
-  constexpr std::size_t longest = 40;
-  std::string shown = "'";
-  for (char c : text.substr(0, longest)) shown += (c >= ' ' && c < '\x7f') ? c : '?';
-  return shown + (text.size() > longest ? "...'" : "'");
-}
+std::string in_quotes(std::string_view text) { return std::string("'").append(printable(text)).append("'"); }
 
 void TextCursor::fail(std::string_view message) const {
   std::string text = file_ + ":" + std::to_string(line_) + ": ";

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "penalty/math/types.h"
+#include "penalty/math/text.h"
 
 namespace penalty {
 
@@ -17,10 +17,10 @@ std::string lower_extension(const std::filesystem::path& path);
 
 std::string lower_case(std::string_view text);
 
-/// Shortest form that reads back as the same double.
-std::string to_text(Real value);
+/// `text` from a file fit for a one-line message: what is not printable ASCII replaced, all beyond `longest` characters cut.
+std::string printable(std::string_view text, std::size_t longest = 40);
 
-/// `text` fit for a one-line message: control characters replaced, long text cut.
+/// The same between quotes.
 std::string in_quotes(std::string_view text);
 
 /// Reads words, numbers and lines from a text. Words end at white space, which includes line ends; a comment runs from

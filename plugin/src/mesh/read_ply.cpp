@@ -15,6 +15,7 @@ namespace {
 enum class Form { ascii, little_endian, big_endian };
 enum class Type { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
+// Names are kept as messages may show them.
 struct Property {
   std::string name;
   Type type{};
@@ -77,7 +78,7 @@ class PlyReader {
         has_format = true;
       } else if (keyword == "element") {
         Element element;
-        element.name = text_.word("the name of an element");
+        element.name = printable(text_.word("the name of an element"));
         element.count = text_.count("the number of elements", 1);
         elements_.push_back(element);
       } else if (keyword == "property") {
@@ -125,7 +126,7 @@ class PlyReader {
       type = text_.word("the type of a property");
     }
     property.type = type_of(text_, type);
-    property.name = text_.word("the name of a property");
+    property.name = printable(text_.word("the name of a property"));
     element.properties.push_back(property);
   }
 

@@ -35,7 +35,10 @@ TriangleSurface copy_triangles(const aiScene& scene) {
 
 TriangleSurface read_through_assimp(const std::string& name, const std::string& contents,
                                     const std::string& extension) {
-  const auto first_line = [](const std::string& text) { return text.substr(0, text.find_first_of("\r\n")); };
+  // Assimp's messages may end with all that is left of the file.
+  const auto first_line = [](std::string_view text) {
+    return printable(text.substr(0, text.find_first_of("\r\n")), 200);
+  };
   Assimp::Importer importer;  // its log goes nowhere unless a program creates one
   const aiScene* scene = nullptr;
   try {

@@ -1,17 +1,12 @@
 #include "penalty/mesh/write_mesh.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
+
+#include "penalty/math/text.h"
 
 namespace penalty {
 namespace {
-
-void add_number(std::string& text, Real value) {
-  char digits[32];
-  const auto end = std::to_chars(digits, digits + sizeof digits, value, std::chars_format::general, 17).ptr;
-  text.append(digits, end);
-}
 
 void check(const MeshScalars& scalars, std::size_t count, const char* element) {
   const bool bad_name = scalars.name.empty() || std::any_of(scalars.name.begin(), scalars.name.end(),
@@ -29,7 +24,7 @@ void add_scalars(std::string& text, std::span<const MeshScalars> fields, std::si
   for (const MeshScalars& field : fields) {
     text += "SCALARS " + field.name + " double 1\nLOOKUP_TABLE default\n";
     for (Real value : field.values) {
-      add_number(text, value);
+      text += exact_text(value);
       text += '\n';
     }
   }
@@ -56,7 +51,7 @@ void write_vtk(const std::filesystem::path& path, const TetMesh& mesh, std::span
   text += "POINTS " + std::to_string(vertices) + " double\n";
   for (Eigen::Index v = 0; v < mesh.vertices.cols(); ++v)
     for (int axis = 0; axis < 3; ++axis) {
-      add_number(text, mesh.vertices(axis, v));
+      text += exact_text(mesh.vertices(axis, v));
       text += axis < 2 ? ' ' : '\n';
     }
   text += "CELLS " + std::to_string(tetrahedra) + " " + std::to_string(5 * tetrahedra) + "\n";

@@ -14,7 +14,8 @@ struct MeshScalars {
   std::span<const Real> values;
 };
 
-/// Writes `mesh` as VTK legacy ASCII 3.0, coordinates in 17 digits: reading the file gives the same doubles back.
+/// Writes `mesh` as VTK legacy ASCII 3.0, coordinates in the fewest digits from which reading the file gives the
+/// same doubles back.
 /// Throws std::invalid_argument if a scalar field has the wrong length or a bad name, MeshError if the file cannot be
 /// written.
 void write_vtk(const std::filesystem::path& path, const TetMesh& mesh, std::span<const MeshScalars> vertex_scalars = {},

@@ -1,0 +1,24 @@
+#include "fuzz/readers.h"
+#include "mesh/surface_files.h"
+
+namespace penalty::testing {
+
+std::vector<std::string> sample_files(FileFormat format) {
+  switch (format) {
+    case FileFormat::vtk:
+      return {vtk_ascii, vtk_offsets, vtk_binary(), vtk_binary_offsets()};
+    case FileFormat::gmsh:
+      return {gmsh_2, gmsh_41};
+    case FileFormat::tetgen:
+      return {tetgen_node + std::string(tetgen_cut) + tetgen_ele};
+    case FileFormat::ply:
+      return {ply, ply_binary(false), ply_binary(true)};
+    case FileFormat::obj:
+      return {obj};
+    case FileFormat::stl:
+      return {stl_ascii(), stl_binary()};
+  }
+  return {};
+}
+
+}  // namespace penalty::testing
