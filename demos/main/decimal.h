@@ -6,8 +6,8 @@
 
 namespace penalty::demo {
 
-/// Makes the options of these names decimal. The C library behind CLI11 would take 0x10 for 16, and, where a whole number is
-/// wanted, 010 for 8.
+/// Makes the options of these names decimal. The C library behind CLI11 would take 0x10 for 16, and, where a whole
+/// number is wanted, 010 for 8.
 inline void read_as_decimal(CLI::App& app, std::initializer_list<const char*> names) {
   const CLI::Validator decimal(
       [](std::string& text) -> std::string {

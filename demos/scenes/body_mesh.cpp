@@ -80,8 +80,8 @@ std::vector<Triangle> BodyMesh::drawn_triangles() const {
   return surface ? surface->surface.triangles : boundary_faces(solid().tetrahedra);
 }
 
-std::vector<ContactPoint> BodyMesh::contact_points() const {
-  std::vector<ContactPoint> points;
+std::vector<WeightedPoint> BodyMesh::contact_points() const {
+  std::vector<WeightedPoint> points;
   if (!surface) return points;
   // The lattice knows its cell only through its shape: the longest edge of a tetrahedron is one cell long.
   const Tetrahedron& t = solid().tetrahedra.front();
@@ -89,10 +89,10 @@ std::vector<ContactPoint> BodyMesh::contact_points() const {
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < i; ++j) cell = std::max(cell, (vertices().col(t[i]) - vertices().col(t[j])).norm());
   for (int vertex : contact_samples(*surface, cell / samples_per_cell)) {
-    ContactPoint point;
+    WeightedPoint point;
     point.particles = surface->stencils[vertex];
     for (int k = 0; k < 4; ++k) point.weights[k] = surface->weights(k, vertex);
-    point.num_particles = 4;
+    point.size = 4;
     points.push_back(point);
   }
   return points;

@@ -4,8 +4,8 @@
 #include <optional>
 #include <variant>
 
+#include "penalty/contact/weighted_point.h"
 #include "penalty/mesh/embed.h"
-#include "penalty/stepping/contact.h"
 #include "scenes/scene_options.h"
 
 namespace penalty::demo {
@@ -32,7 +32,7 @@ struct BodyMesh {
   std::vector<Triangle> drawn_triangles() const;
 
   /// Points of the surface that stand for it in contacts; empty without a surface: every vertex of the mesh then does.
-  std::vector<ContactPoint> contact_points() const;
+  std::vector<WeightedPoint> contact_points() const;
 };
 
 /// The Stanford bunny as Debian's package glmark2-data brings it.

@@ -35,13 +35,9 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
   const auto num_vertices = static_cast<int>(rest.cols());
   Sheet sheet = canvas;
   if (options.young) sheet.young = *options.young;
-  PotentialField field = shell_field(body.shell(), sheet);
-  Real mass = sheet.density * sheet.thickness * area(body.shell());
-  if (options.stiffness) {
-    field = PotentialField(rest);
-    field.add<Length>(body.edges(), *options.stiffness);
-    mass = 1;
-  }
+  PotentialField field = options.stiffness ? PotentialField(rest) : shell_field(body.shell(), sheet);
+  if (options.stiffness) field.add<Length>(body.edges(), *options.stiffness);
+  const Real mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell());
 
   const int side = static_cast<int>(std::lround(std::sqrt(num_vertices)));
   const std::vector<int> corners{0, side - 1, num_vertices - side, num_vertices - 1};

@@ -28,12 +28,11 @@ Real ball_height(Real time) {
 /// What the yield law makes of the strains that were seen: the elastic part of a strain C never exceeds the yield
 /// strain, and the plastic part p moves only as far as that asks for, p' = C - clamp(C - p, -yield, yield).
 struct YieldLaw {
-  std::vector<Real> plastic, strains;
+  std::vector<Real> plastic;
 
   void see(const Positions& x, const Batch<Length>& springs) {
     plastic.resize(springs.num_elements(), 0);
-    strains.clear();
-    springs.append_strains(x, strains);  // elastic ones
+    const std::vector<Real> strains = penalty::strains(springs, x);  // elastic ones
     for (std::size_t e = 0; e < plastic.size(); ++e) {
       const Real total = strains[e] + springs.plastic_strain(static_cast<int>(e));
       plastic[e] = std::clamp(total - std::clamp(total - plastic[e], -flow.yield, flow.yield), -flow.limit, flow.limit);
@@ -55,8 +54,7 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, const Y
     rim += x(1, i);
     ++num_rim;
   }
-  std::vector<Real> elastic;
-  springs.append_strains(x, elastic);
+  const std::vector<Real> elastic = strains(springs, x);
   Real mean = 0, largest = 0, error = 0, largest_elastic = 0;
   for (std::size_t e = 0; e < law.plastic.size(); ++e) {
     const Real plastic = springs.plastic_strain(static_cast<int>(e));

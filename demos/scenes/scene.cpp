@@ -49,7 +49,7 @@ struct Scene::Impl {
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the objects, then the ground
   std::unique_ptr<btSoftBody> body;
-  std::vector<ContactPoint> contact_points;
+  std::vector<WeightedPoint> contact_points;
   Real tip_start = 0, time = 0;
   std::size_t restarts_done = 0;
   Real time_asleep = 0;  // [s]
@@ -121,7 +121,7 @@ struct Scene::Impl {
     AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
     contact_points = attach.contact_points;
     if (contact_points.empty())
-      for (int i = 0; i < body->m_nodes.size(); ++i) contact_points.push_back(ContactPoint::at_particle(i));
+      for (int i = 0; i < body->m_nodes.size(); ++i) contact_points.push_back(WeightedPoint::at_particle(i));
     world.attached().attach(*body, std::move(setup.field), attach);
     tip_start = mean_tip_height(pack(setup.positions));
   }
@@ -219,9 +219,8 @@ Real Scene::penetration() const {
   const PackedVectors& x = particles().positions;
   const std::vector<Pose> poses = objects();
   Real deepest = 0;
-  for (const ContactPoint& point : impl_->contact_points) {
-    Vector3 position = Vector3::Zero();
-    for (int k = 0; k < point.num_particles; ++k) position += point.weights[k] * x.col(point.particles[k]).head<3>();
+  for (const WeightedPoint& point : impl_->contact_points) {
+    const Vector3 position = point.of(x);
     if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
     for (std::size_t b = 0; b < poses.size(); ++b)
       deepest = std::max(deepest, depth(impl_->setup.objects[b], poses[b], position));

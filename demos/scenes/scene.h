@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "penalty/stepping/particles.h"
+#include "penalty/stepping/step_report.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {

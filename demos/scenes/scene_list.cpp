@@ -1,6 +1,6 @@
 #include <stdexcept>
 
-#include "penalty/fields/two_phase.h"
+#include "penalty/fields/elastic_field.h"
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {

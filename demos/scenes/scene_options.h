@@ -8,7 +8,7 @@
 
 #include "penalty/energy/material.h"
 #include "penalty/math/types.h"
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/step_options.h"
 
 namespace penalty::demo {
 
@@ -37,7 +37,7 @@ struct SceneOptions {
   std::optional<Real> young{};      // [Pa], with the mass that follows from the density
   std::optional<Real> poisson{};
   std::optional<ElasticModel> model{};  // of bodies made of tetrahedra
-  std::optional<int> phases{};          // 2: tetrahedra give way far from rest, see TwoPhase
+  std::optional<int> phases{};          // 2: tetrahedra give way far from rest, see make_recovering_field
   std::optional<Real> damping{};        // ratio of damping to stiffness [s]
   std::optional<Real> drag{};           // [1/s]
   std::optional<int> substeps{};        // in a step; empty: from the stability limit

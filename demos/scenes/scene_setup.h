@@ -6,8 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "penalty/fields/potential_field.h"
-#include "penalty/stepping/step.h"
+#include "penalty/fields/elastic_field.h"
+#include "penalty/fields/ledger.h"
+#include "penalty/stepping/step_options.h"
 #include "scenes/body_mesh.h"
 #include "scenes/figure.h"
 #include "scenes/rigid_object.h"

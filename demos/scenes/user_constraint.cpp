@@ -4,6 +4,7 @@
 #include <numbers>
 #include <type_traits>
 
+#include "penalty/fields/batch_loops.h"
 #include "penalty/kinds/user_constraint.h"
 #include "penalty/mesh/builders.h"
 #include "scenes/scene_setup.h"
@@ -52,8 +53,7 @@ std::vector<std::array<int, 4>> ladder(const Eigen::Matrix3Xd& rest, int section
 /// Turns from one end to the other: the mean angle from section to section, times their number.
 Real num_turns(const Positions& x, const PotentialField& field, Real num_sections) {
   const Batch<Twist>& rungs = *field.find<Twist>();
-  std::vector<Real> missing;
-  rungs.append_strains(x, missing);
+  const std::vector<Real> missing = strains(rungs, x);
   Real angle = 0;
   for (std::size_t e = 0; e < missing.size(); ++e) angle += missing[e] + rungs.target(static_cast<int>(e));
   return angle / static_cast<Real>(missing.size()) * num_sections / (2 * std::numbers::pi);

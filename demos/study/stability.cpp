@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <random>
 
-#include "penalty/fields/potential_field.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/kinds/kinds.h"
 #include "penalty/mesh/builders.h"
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty::study {
 namespace {
@@ -22,15 +22,15 @@ SteppedBody make_body(PotentialField& field, std::vector<Real> inverse_masses) {
   SteppedBody body;
   const PackedVectors& rest = field.rest_positions();
   body.particles = {rest, PackedVectors::Zero(4, rest.cols()), std::move(inverse_masses)};
-  body.potential = &field;
+  body.field = &field;
   body.options.integrator = Integrator::implicit_step;
-  estimate_stability(body, rest);
+  estimate_stability(body);
   return body;
 }
 
 void step(SteppedBody& body, Real duration) {
-  SteppedBody* bodies[] = {&body};
-  advance(bodies, {}, duration);
+  Island island{.bodies = {&body}};
+  advance(island, duration);
 }
 
 Real relative(const Vector3& change, const Vector3& start) { return change.norm() / start.norm(); }

@@ -3,7 +3,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "penalty/fields/two_phase.h"
+#include "penalty/fields/elastic_field.h"
 
 namespace penalty::study {
 namespace {

@@ -1,5 +1,5 @@
-// Nanoseconds an element: of one evaluation of the forces, where the argument is the number of cells across the beam, and
-// of its projected stiffness.
+// Nanoseconds an element: of one evaluation of the forces, where the argument is the number of cells across the beam,
+// and of its projected stiffness.
 #include <benchmark/benchmark.h>
 
 #include <random>

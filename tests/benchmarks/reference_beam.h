@@ -1,6 +1,6 @@
 // The beam that the benchmarks step: 4 x 1 x 1 m, E = 10 MPa, 1000 kg/m³, held at x = 0.
 #pragma once
-#include "penalty/fields/potential_field.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/builders.h"
 
 namespace penalty {

@@ -1,5 +1,5 @@
-// Momentum and energy of free bodies, alone and in collision with rigid ones. Limits in single precision are the rounding of
-// Bullet's own rigid velocities and transforms; the soft bodies are carried in double.
+// Momentum and energy of free bodies, alone and in collision with rigid ones. Limits in single precision are the
+// rounding of Bullet's own rigid velocities and transforms; the soft bodies are carried in double.
 #include "bullet/simulation.h"
 
 namespace penalty::testing {
@@ -57,9 +57,9 @@ TEST_P(Collision, AFreeSpinningStretchedBodyKeepsItsMomentaForTenSeconds) {
   EXPECT_LT(highest_energy, 1.005 * start.energy);
 }
 
-// Tori of 1 kg at rest, hit by a rigid body at 5 m/s, off centre. A hit is inelastic for the layer of nodes that it meets, so
-// energy falls; what a step may gain in between is up to the energy guard's tolerance (0.5 %). Spheres and cubes turn without
-// gyroscopic torque.
+// Tori of 1 kg at rest, hit by a rigid body at 5 m/s, off centre. A hit is inelastic for the layer of nodes that it
+// meets, so energy falls; what a step may gain in between is up to the energy guard's tolerance (0.5 %). Spheres and
+// cubes turn without gyroscopic torque.
 class RigidHit : public Collision {
  protected:
   void hit(std::unique_ptr<btCollisionShape> shape, Real mass, const Matrix3& rotation) {
@@ -126,8 +126,8 @@ TEST_P(Collision, AChainOfSoftAndRigidBodiesKeepsTheMomentum) {
   EXPECT_GT(linear_momentum(sim.penalty().particles(*balls[2])).x(), 0.5) << "the push went through";
 }
 
-// A thin plate far too fast to be seen inside the soft body at the end of any step. It is set spinning, and Bullet integrates
-// gyroscopic torque to first order only: angular momentum drifts by about one per cent of the spin.
+// A thin plate far too fast to be seen inside the soft body at the end of any step. It is set spinning, and Bullet
+// integrates gyroscopic torque to first order only: angular momentum drifts by about one per cent of the spin.
 TEST_P(Collision, AFastPlateDoesNotTunnel) {
   const TetMesh ball = make_ball(0.5, 3);
   btSoftBody& body = sim.add_jelly(ball);

@@ -1,4 +1,5 @@
-// Fields that change while the world runs: targets, breaking, a kind of one's own; the ledger that is read between steps.
+// Fields that change while the world runs: targets, breaking, a kind of one's own; the ledger that is read between
+// steps.
 #include "bullet/simulation.h"
 
 namespace penalty::testing {
@@ -182,6 +183,32 @@ TEST_P(Attachments, ABodyHangsOnAKinematicHandThatMoves) {
   EXPECT_LT(center_of_mass(sim.penalty().particles(body)).y(), -0.5) << "falls when let go";
 }
 
+TEST_P(Attachments, HoldAPointBetweenNodes) {
+  // 1 kg hangs by a point of its upper side where no node is.
+  sim.set_gravity({0, -9.81, 0});
+  btSoftBody& body = sim.add_jelly(make_box({1, 1, 1}, {2, 2, 2}),
+                                   {.stiffness = 100, .attach = {.step = {.damping_time = 0.02, .drag = 0.5}}});
+  btRigidBody& hook = sim.add_box({0.01, 0.01, 0.01}, 0, {3, 3, 3});
+  const int corners[] = {nearest(body, {0, 1, 0}), nearest(body, {1, 1, 0}), nearest(body, {0.5, 1, 1})};
+  const WeightedPoint point{{corners[0], corners[1], corners[2]}, {0.3, 0.3, 0.4}, 3};
+  const auto place = [&] {
+    Vector3 sum = Vector3::Zero();
+    for (int k = 0; k < 3; ++k) sum += point.weights[k] * to_vector(body.m_nodes[corners[k]].m_x);
+    return sum;
+  };
+  const Vector3 start = place();
+  Eigen::Matrix3Xd rest(3, 2);
+  rest << start, start;
+  PotentialField tie(rest);
+  tie.add(Attachment::of_length(1), std::vector<Edge>{{0, 1}}, 5000);  // [N/m]
+  sim.penalty().couple({CouplingPoint::between(body, point), CouplingPoint::on(hook, start - Vector3(3, 3, 3))},
+                       std::move(tie), 0.01);
+  sim.step(frame, 900);
+  EXPECT_NEAR((place() - start).y(), -9.81 / 5000, 0.02 * 9.81 / 5000);
+  EXPECT_LT((place() - start).cwiseProduct(Vector3(1, 0, 1)).norm(), 2e-4);
+  EXPECT_GT(start.y() - center_of_mass(sim.penalty().particles(body)).y(), 0.3) << "below it";
+}
+
 TEST_P(Attachments, RefuseWhatCannotBeAndSayWhich) {
   btSoftBody& body = sim.add_jelly(make_box({1, 1, 1}, {1, 1, 1}));
   btRigidBody& box = sim.add_box({0.1, 0.1, 0.1}, 1, {0, 3, 0});
@@ -191,9 +218,8 @@ TEST_P(Attachments, RefuseWhatCannotBeAndSayWhich) {
   };
   const CouplingPoint node = CouplingPoint::at_node(body, 0), rigid = CouplingPoint::on(box, {0, 0, 0});
   EXPECT_EQ(refusal({node, rigid}, 3), "couple: the field has 3 particles for 2 points");
-  EXPECT_EQ(refusal({node, CouplingPoint::at_node(body, 8)}, 2),
-            "couple: point 1: node 8 is outside the 8 of its body");
-  EXPECT_EQ(refusal({node, node}, 2), "couple: point 1: node 0 is point 0 already");
+  EXPECT_EQ(refusal({node, CouplingPoint::at_node(body, 8)}, 2), "couple: point 1: index 8 is outside the 8 nodes");
+  EXPECT_EQ(refusal({node, node}, 2), "couple: point 1: is the same as point 0");
   EXPECT_EQ(refusal({rigid}, 1), "couple: none of the 1 points is of a soft body");
   EXPECT_EQ(refusal({node, CouplingPoint{}}, 2), "couple: point 1: must be of one body, soft or rigid");
   const std::unique_ptr<btSoftBody> stranger = make_soft_body(sim.info(), make_box({1, 1, 1}, {1, 1, 1}));

@@ -147,9 +147,9 @@ class Refused : public WorldTest {
     return what;
   }
   std::string stepping_with(const StepOptions& step) { return attaching_with({step, {}}); }
-  std::string touching_with(const ContactPoint& point) {
+  std::string touching_with(const WeightedPoint& point) {
     AttachOptions options;
-    options.contact_points = {ContactPoint::at_particle(0), point};
+    options.contact_points = {WeightedPoint::at_particle(0), point};
     return attaching_with(options);
   }
   std::string making_with(const SoftBodyOptions& options) {
@@ -205,8 +205,8 @@ TEST_P(Refused, QuestionsAboutABodyThatIsNotAttached) {
 TEST_P(Refused, ContactPointsThatAreNotPointsOfTheBody) {
   EXPECT_EQ(touching_with({}), "attach: contact point 1: has 0 particles, must have 1 to 4");
   EXPECT_EQ(touching_with({{0}, {1}, 5}), "attach: contact point 1: has 5 particles, must have 1 to 4");
-  EXPECT_EQ(touching_with(ContactPoint::at_particle(13)), "attach: contact point 1: index 13 is outside the 13 nodes");
-  EXPECT_EQ(touching_with(ContactPoint::at_particle(-1)), "attach: contact point 1: index -1 is outside the 13 nodes");
+  EXPECT_EQ(touching_with(WeightedPoint::at_particle(13)), "attach: contact point 1: index 13 is outside the 13 nodes");
+  EXPECT_EQ(touching_with(WeightedPoint::at_particle(-1)), "attach: contact point 1: index -1 is outside the 13 nodes");
   EXPECT_EQ(touching_with({{0, 1}, {0.5, 0.25}, 2}), "attach: contact point 1: weights sum to 0.75, must sum to 1");
   EXPECT_EQ(touching_with({{0, 1}, {0.5, Real(nan)}, 2}), "attach: contact point 1: weights sum to nan, must sum to 1");
 }

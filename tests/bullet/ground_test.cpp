@@ -167,7 +167,7 @@ TEST_P(Ground, OnlyContactPointsTouchIfTheyAreGiven) {
     if ((box.vertices.col(i) - Vector3(0.2, 0.4, 0.2)).norm() < 1e-9) top = i;
   ASSERT_GE(top, 0);
   AttachOptions attach;
-  attach.contact_points = {ContactPoint::at_particle(top)};
+  attach.contact_points = {WeightedPoint::at_particle(top)};
   attach.step.damping_time = 0.01;
   btSoftBody& body = sim.add_jelly(box, {.stiffness = 50, .shift = {0, 0.1, 0}, .attach = attach});
   sim.step(frame, 180);

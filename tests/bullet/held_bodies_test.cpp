@@ -1,5 +1,5 @@
-// A step never throws: a body that cannot be stepped stays where it is, says why, and goes on when that is mended. All else goes
-// on as if it were not there.
+// A step never throws: a body that cannot be stepped stays where it is, says why, and goes on when that is mended. All
+// else goes on as if it were not there.
 #include <limits>
 #include <stdexcept>
 
@@ -52,7 +52,8 @@ struct Moody {
   static inline Mood mood = Mood::good;
 };
 
-// A ball that has fallen for a while, with a second one and a rigid box beside it, and the same world without the first.
+// A ball that has fallen for a while, with a second one and a rigid box beside it, and the same world without the
+// first.
 class Held : public WorldTest {
  protected:
   void SetUp() override {
@@ -281,7 +282,8 @@ TEST_P(NoStep, OnesThatLeadOutOfRange) {
 
 INSTANTIATE_TEST_SUITE_P(World, NoStep, both_worlds(), param_name);
 
-// Settings that are no numbers for some steps, on a body that falls: it waits, and falls on. Bullet would have switched it off.
+// Settings that are no numbers for some steps, on a body that falls: it waits, and falls on. Bullet would have switched
+// it off.
 class BadSetting : public Held {
  protected:
   template <class Set>

@@ -1,4 +1,5 @@
-// A body is known by what it carries, not by its address: bodies deleted without `detach`, and what is built on their ruins.
+// A body is known by what it carries, not by its address: bodies deleted without `detach`, and what is built on their
+// ruins.
 #include <cstring>
 #include <new>
 

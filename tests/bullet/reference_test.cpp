@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "bullet/simulation.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty::testing {
 namespace {
@@ -28,10 +29,10 @@ class Reference : public WorldTest {
   SteppedBody copy_of(const btSoftBody& body, PotentialField& field, const StepOptions& options) {
     SteppedBody copy;
     copy.particles = sim.penalty().particles(body);
-    copy.potential = &field;
+    copy.field = &field;
     copy.options = options;
     copy.gravity = to_vector(sim.info().m_gravity);
-    estimate_stability(copy, field.rest_positions());
+    estimate_stability(copy);
     return copy;
   }
 
@@ -50,10 +51,10 @@ TEST_P(Reference, FreeFlightIsThatOfTheIntegratorAloneToTheLastBit) {
   btSoftBody& body = add_noisy_ball();
   PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody copy = copy_of(body, field, {});
-  SteppedBody* bodies[] = {&copy};
+  Island island{.bodies = {&copy}};
   const PackedVectors start = copy.particles.positions;
   for (int step = 0; step < 20; ++step) {
-    advance(bodies, {}, 1.0 / 64);
+    advance(island, 1.0 / 64);
     sim.step(1.0 / 64);
     ASSERT_EQ(sim.penalty().particles(body).positions, copy.particles.positions) << "step " << step;
     ASSERT_EQ(sim.penalty().particles(body).velocities, copy.particles.velocities) << "step " << step;
@@ -72,9 +73,9 @@ TEST_P(Reference, WithGravityDampingAndDragItIsTheSame) {
   btSoftBody& body = add_noisy_ball({.step = options});
   PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody copy = copy_of(body, field, options);
-  SteppedBody* bodies[] = {&copy};
+  Island island{.bodies = {&copy}};
   for (int step = 0; step < 20; ++step) {
-    advance(bodies, {}, 1.0 / 64);
+    advance(island, 1.0 / 64);
     sim.step(1.0 / 64);
     ASSERT_EQ(sim.penalty().particles(body).positions, copy.particles.positions) << "step " << step;
     ASSERT_EQ(sim.penalty().particles(body).velocities, copy.particles.velocities) << "step " << step;
@@ -85,15 +86,15 @@ TEST_P(Reference, AStepThatIsNotDyadicIsOnlyRounded) {
   btSoftBody& body = add_noisy_ball();
   PotentialField field = make_elastic_field(rest_.vertices, rest_.tetrahedra, 5.0);
   SteppedBody rounded = copy_of(body, field, {}), exact = copy_of(body, field, {});
-  SteppedBody *rounded_bodies[] = {&rounded}, *exact_bodies[] = {&exact};
+  Island rounded_island{.bodies = {&rounded}}, exact_island{.bodies = {&exact}};
   for (int step = 0; step < 20; ++step) {
-    advance(rounded_bodies, {}, handed_on(1.0 / 60));
-    advance(exact_bodies, {}, 1.0 / 60);
+    advance(rounded_island, handed_on(1.0 / 60));
+    advance(exact_island, 1.0 / 60);
     sim.step(1.0 / 60);
   }
   EXPECT_EQ(sim.penalty().particles(body).positions, rounded.particles.positions);
-  // A step longer by the rounding 2^-25 leads ahead by that share of the path travelled; factor 10 for the frequency of the
-  // discrete motion, which depends on the substep too.
+  // A step longer by the rounding 2^-25 leads ahead by that share of the path travelled; factor 10 for the frequency of
+  // the discrete motion, which depends on the substep too.
   const Real path = exact.particles.velocities.colwise().norm().maxCoeff() * 20 / 60;
   const Real difference = largest_difference(rounded.particles.positions, exact.particles.positions);
   RecordProperty("difference", std::to_string(difference * 1e9) + " nm");

@@ -135,8 +135,8 @@ Real lowest(const btSoftBody& body) {
 }
 
 Real mean_volume_error(const AttachedBodies& penalty, const btSoftBody& body) {
-  std::vector<Real> values;
-  penalty.field(body).find<TetrahedronVolume>()->append_strains(penalty.particles(body).positions, values);
+  const std::vector<Real> values =
+      strains(penalty.field(body).batch<TetrahedronVolume>(), penalty.particles(body).positions);
   Real sum = 0;
   for (const Real value : values) sum += std::abs(value);
   return sum / static_cast<Real>(values.size());

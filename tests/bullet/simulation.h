@@ -14,6 +14,8 @@
 #include "convert.h"
 #include "penalty/bullet/attached_bodies.h"
 #include "penalty/bullet/soft_body.h"
+#include "penalty/fields/batch_loops.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/builders.h"
 #include "scenes/bullet_world.h"
 

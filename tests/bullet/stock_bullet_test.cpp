@@ -8,7 +8,7 @@
 
 #include <limits>
 
-#include "penalty/fields/two_phase.h"
+#include "penalty/fields/elastic_field.h"
 
 namespace penalty::testing {
 namespace {

@@ -72,8 +72,7 @@ void expect_distance(const btCollisionShape& shape, const Distance& distance, Re
 
 TEST(SurfaceDistance, OfASphere) {
   const btSphereShape sphere(0.75);
-  expect_distance(
-      sphere, [](const Vector3& p) { return p.norm() - 0.75; }, 1e-12, 1e-12);
+  expect_distance(sphere, [](const Vector3& p) { return p.norm() - 0.75; }, 1e-12, 1e-12);
   const std::vector<SurfacePoint> center = surface_points(sphere, {0, 0, 0});
   ASSERT_EQ(center.size(), 1u);
   EXPECT_NEAR(center[0].distance, -0.75, 1e-12);
@@ -83,8 +82,7 @@ TEST(SurfaceDistance, OfASphere) {
 TEST(SurfaceDistance, OfABox) {
   const Vector3 half(0.5, 0.25, 1);
   const btBoxShape box(to_bullet(half));
-  expect_distance(
-      box, [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-7), limit(1e-12, 1e-7));
+  expect_distance(box, [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-7), limit(1e-12, 1e-7));
 }
 
 TEST(SurfaceDistance, OfCapsulesAlongEachAxis) {
@@ -113,10 +111,7 @@ TEST(SurfaceDistance, OfACylinder) {
   const btCylinderShape cylinder(btVector3(0.5, 0.75, 0.5));
   const Real m = Real(cylinder.getMargin()), r = 0.5 - m, h = 0.75 - m;
   expect_distance(
-      cylinder,
-      [&](const Vector3& p) {
-        return revolved_distance(p, {{0, -h}, {r, -h}, {r, h}, {0, h}}) - m;
-      },
+      cylinder, [&](const Vector3& p) { return revolved_distance(p, {{0, -h}, {r, -h}, {r, h}, {0, h}}) - m; },
       limit(1e-4, 5e-4), 5e-3);
 }
 
@@ -124,10 +119,7 @@ TEST(SurfaceDistance, OfACone) {
   const btConeShape cone(static_cast<btScalar>(0.6), static_cast<btScalar>(1.2));
   const Real m = Real(cone.getMargin());
   expect_distance(
-      cone,
-      [&](const Vector3& p) {
-        return revolved_distance(p, {{0, -0.6}, {0.6, -0.6}, {0, 0.6}}) - m;
-      },
+      cone, [&](const Vector3& p) { return revolved_distance(p, {{0, -0.6}, {0.6, -0.6}, {0, 0.6}}) - m; },
       limit(1e-4, 5e-4), 5e-3, 0.8);
 }
 

@@ -3,7 +3,7 @@
 
 #include <thread>
 
-#include "penalty/fields/two_phase.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/builders.h"
 #include "penalty/stepping/relax.h"
 #include "recovery.h"

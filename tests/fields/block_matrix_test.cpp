@@ -51,13 +51,9 @@ TEST(BlockMatrix, ProductIsThatOfTheDenseMatrix) {
 }
 
 TEST(BlockMatrix, RefusesAPatternOutsideTheParticles) {
-  EXPECT_EQ(complaint<std::out_of_range>([] {
-              BlockMatrix(3, {{0, 1}, {2, 3}});
-            }),
+  EXPECT_EQ(complaint<std::out_of_range>([] { BlockMatrix(3, {{0, 1}, {2, 3}}); }),
             "block matrix: block (2, 3) of 3 particles");
-  EXPECT_EQ(complaint<std::out_of_range>([] {
-              BlockMatrix(3, {{-1, 0}});
-            }),
+  EXPECT_EQ(complaint<std::out_of_range>([] { BlockMatrix(3, {{-1, 0}}); }),
             "block matrix: block (-1, 0) of 3 particles");
 }
 

@@ -11,30 +11,27 @@ namespace {
 // what `displacement` says; `load` acts on the others [N].
 Eigen::Matrix3Xd equilibrium(const PotentialField& field, Eigen::Matrix3Xd displacement,
                              const Eigen::Array<bool, 3, Eigen::Dynamic>& fixed, const Eigen::Matrix3Xd& load) {
-  const BlockMatrix stiffness = assembled(field, field.rest_positions(), StiffnessModel::exact);
+  const System assembled_stiffness = assembled(field, field.rest_positions(), StiffnessModel::exact);
+  const BlockMatrix& stiffness = assembled_stiffness.blocks();
   std::vector<int> unknown(static_cast<std::size_t>(fixed.size()));  // index among the free coordinates, or -1
   int num_unknown = 0;
   for (Eigen::Index c = 0; c < fixed.size(); ++c) unknown[c] = fixed.data()[c] ? -1 : num_unknown++;
-  std::vector<std::pair<int, int>> pattern;
-  field.append_pattern(pattern);
-  std::sort(pattern.begin(), pattern.end());
-  pattern.erase(std::unique(pattern.begin(), pattern.end()), pattern.end());
   std::vector<Eigen::Triplet<Real>> entries;
   Eigen::VectorXd right_side = Eigen::VectorXd::Zero(num_unknown);
   for (std::size_t c = 0; c < unknown.size(); ++c)
     if (unknown[c] >= 0) right_side[unknown[c]] = load.data()[c];
-  for (auto [i, j] : pattern) {
-    const Matrix3 block = stiffness.block(i, j);
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        const int row = unknown[3 * i + a], column = unknown[3 * j + b];
-        if (row < 0) continue;
-        if (column < 0)
-          right_side[row] -= block(a, b) * displacement(b, j);
-        else
-          entries.emplace_back(row, column, block(a, b));
-      }
-  }
+  for (int i = 0; i < stiffness.num_particles(); ++i)
+    stiffness.visit_row(i, [&](int j, const Matrix3& block) {
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b) {
+          const int row = unknown[3 * i + a], column = unknown[3 * j + b];
+          if (row < 0) continue;
+          if (column < 0)
+            right_side[row] -= block(a, b) * displacement(b, j);
+          else
+            entries.emplace_back(row, column, block(a, b));
+        }
+    });
   Eigen::SparseMatrix<Real> k(num_unknown, num_unknown);
   k.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>> factors(k);
@@ -85,7 +82,8 @@ Moduli measured(const PotentialField& field) {
 
 Real measured_young(const PotentialField& field) { return measured(field).young; }
 
-// The end of the beam 4 x 1 x 1 m, clamped at x = 0, under a shear load on its end face, over that of Timoshenko's beam.
+// The end of the beam 4 x 1 x 1 m, clamped at x = 0, under a shear load on its end face, over that of Timoshenko's
+// beam.
 Real tip_over_timoshenko(int cells_across, const Material& material, ElasticModel model) {
   const TetMesh mesh = make_beam(cells_across);
   const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, material, model);
@@ -237,10 +235,9 @@ TEST(ElasticField, DampsAsItsMaterialSays) {
     EXPECT_TRUE(field.damps());
     Random random(1);
     const PackedVectors v = random_packed(8, 1, random);
-    PackedVectors own = PackedVectors::Zero(4, 8), of_step = own;
-    field.add_damping_forces(field.rest_positions(), v, 0, own);
-    make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{}, model)
-        .add_damping_forces(field.rest_positions(), v, 0.02, of_step);
+    const PackedVectors own = damping_forces(field, field.rest_positions(), v, 0);
+    const PackedVectors of_step = damping_forces(make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{}, model),
+                                                 field.rest_positions(), v, 0.02);
     ASSERT_GT(own.norm(), 0);
     EXPECT_LT(relative_error(own, of_step), 1e-14);
   }

@@ -1,5 +1,6 @@
 // What may change about the elements of a batch, and what it refuses.
 #include "fields/meshes.h"
+#include "penalty/fields/batch_loops.h"
 
 namespace penalty::testing {
 namespace {
@@ -72,12 +73,12 @@ TEST(ElementBatch, TargetOfAnAngleIsReachedTheShorterWayRound) {
     return x;
   };
   std::vector<Real> strains;
-  hinge.append_strains(folded(1), strains);
+  strains.push_back(penalty::strains(hinge, folded(1))[0]);
   const Real sign = strains[0] > 0 ? 1 : -1;
   hinge.set_target(0, 3.0);
   strains.clear();
-  hinge.append_strains(folded(sign * 3.1), strains);
-  hinge.append_strains(folded(sign * 3.2), strains);
+  strains.push_back(penalty::strains(hinge, folded(sign * 3.1))[0]);
+  strains.push_back(penalty::strains(hinge, folded(sign * 3.2))[0]);
   EXPECT_NEAR(strains[0], 0.1, 1e-12);
   EXPECT_NEAR(strains[1], 0.2, 1e-12);
 }
@@ -118,8 +119,7 @@ TEST(ElementBatch, PlasticStrainAndTargetAddUp) {
   EXPECT_NEAR(strip.springs.plastic_strain(1), 0.5 - 0.05, 1e-15);
   EXPECT_NEAR(strip.springs.target(0), 0.1, 1e-15);
   strip.springs.set_target(0, 0.2);  // the plastic part stays
-  std::vector<Real> strains;
-  strip.field.append_strains(strip.stretched(1.5), strains);
+  const std::vector<Real> strains = penalty::strains(strip.field, strip.stretched(1.5));
   EXPECT_NEAR(strains[0], -0.05, 1e-15);
   EXPECT_NEAR(strains[1], 0.05, 1e-15);
   EXPECT_EQ(strip.field.evolve(strip.stretched(1.5), 0.01), 0);
@@ -143,19 +143,53 @@ TEST(ElementBatch, BrokenElementsLeaveAndAreReported) {
   EXPECT_NEAR(strip.field.energy(x), before, 1e-14);
 }
 
-TEST(ElementBatch, RestoredStateIsTheSavedOne) {
+TEST(ElementBatch, StateIsAMementoThatGoesBackAndForth) {
   Strip strip;
   strip.springs.set_plasticity({.yield = 0.05});
   strip.springs.set_breaking(1, {.upper = 0.04});
   const PackedVectors x = strip.stretched(1.3);
-  strip.field.save_state();
-  const Real before = strip.field.energy(x);
+  const FieldState before = strip.field.state();
+  const Real energy_before = strip.field.energy(x);
   EXPECT_GT(strip.field.evolve(x, 1), 0);
-  EXPECT_LT(strip.field.energy(x), before);
-  strip.field.restore_state();
-  EXPECT_EQ(strip.field.energy(x), before);
+  const FieldState after = strip.field.state();
+  const Real energy_after = strip.field.energy(x);
+  EXPECT_LT(energy_after, energy_before);
+  ASSERT_EQ(strip.springs.breaks().size(), 1u);
+  strip.field.set_state(before);
+  EXPECT_EQ(strip.field.energy(x), energy_before);
   EXPECT_TRUE(strip.springs.breaks().empty());
   EXPECT_EQ(strip.springs.plastic_strain(0), 0);
+  EXPECT_EQ(strip.field.state().values, before.values);
+  strip.field.set_state(after);
+  EXPECT_EQ(strip.field.energy(x), energy_after);
+  ASSERT_EQ(strip.springs.breaks().size(), 1u);
+  EXPECT_EQ(strip.springs.breaks()[0].element, 1);
+  EXPECT_FALSE(strip.springs.is_enabled(1));
+}
+
+TEST(ElementBatch, StateBeforeAnyModifierIsThatOfTheElementsAsTheyWereAdded) {
+  Strip strip;
+  const FieldState fresh = strip.field.state();
+  strip.springs.set_targets(0.2);
+  strip.springs.set_free_play(0, -infinite, 0);
+  strip.springs.set_enabled(2, false);
+  strip.field.set_state(fresh);
+  EXPECT_EQ(strip.springs.target(1), 0);
+  EXPECT_TRUE(strip.springs.is_enabled(2));
+  EXPECT_NEAR(strip.field.energy(strip.stretched(0.9)), 2 * 10.0 / 2 * 0.1 * 0.1, 1e-15) << "free play is no state";
+}
+
+TEST(ElementBatch, RefusesTheStateOfAnotherField) {
+  Strip strip, broken;
+  broken.springs.set_breaking({.upper = 0.1});
+  FieldState state = broken.field.state();
+  state.values.pop_back();
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { strip.field.set_state(state); }),
+            "length: the state ends early, after 7 of 8 numbers");
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { strip.field.set_state({{3, 0, 7, 0, 0}}); }),
+            "length: the state is not one of these 3 elements: it holds 7");
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { strip.field.set_state({{0, 0, 0, 0, 0, 1}}); }),
+            "field: the state holds 1 numbers too many");
 }
 
 TEST(ElementBatch, StiffnessOfADisabledElementIsKeptAndMayBeChanged) {
@@ -192,8 +226,7 @@ TEST(ElementBatch, LedgerSaysHowManyHowMuchAndWhere) {
   strip.springs.set_enabled(0, false);
   PackedVectors x = strip.field.rest_positions();
   x(0, 3) = 3.5;
-  std::vector<LedgerEntry> ledger;
-  strip.field.append_ledger(x, ledger);
+  const std::vector<LedgerEntry> ledger = penalty::ledger(strip.field, x);
   ASSERT_EQ(ledger.size(), 2u);
   EXPECT_EQ(ledger[0].name, "length");
   EXPECT_EQ(ledger[0].num_elements, 3u);
@@ -209,10 +242,9 @@ TEST(ElementBatch, LedgerSaysHowManyHowMuchAndWhere) {
 
 TEST(PotentialField, NamesTheBatchInItsErrors) {
   Strip strip;
-  EXPECT_EQ(complaint<std::invalid_argument>([&] {
-              strip.field.add<Length>(std::vector<Edge>{{0, 1}, {2, 2}}, 1, "brace");
-            }),
-            "brace 1: index 2 appears twice");
+  EXPECT_EQ(
+      complaint<std::invalid_argument>([&] { strip.field.add<Length>(std::vector<Edge>{{0, 1}, {2, 2}}, 1, "brace"); }),
+      "brace 1: index 2 appears twice");
 }
 
 TEST(PotentialField, GroupsOfAnySizeAreCheckedLikeOthers) {
@@ -247,6 +279,34 @@ TEST(PotentialField, RefusesAKindWhoseGradientIsWrongAndSaysBothNumbers) {
   EXPECT_TRUE(message.starts_with("wrong 0: at rest, dC/dp")) << message;
   EXPECT_NE(message.find("is -1"), std::string::npos) << message;
   EXPECT_NE(message.find("differences give -2"), std::string::npos) << message;
+  EXPECT_TRUE(field.potentials().empty());
+}
+
+/// An energy of somebody's own with a mistake in its gradient.
+struct WrongEnergy {
+  static constexpr std::string_view name = "wrong energy";
+  static constexpr int num_points = 2;
+  static WrongEnergy at_rest(const Points<2>& rest) { return {(rest.col(1) - rest.col(0)).norm()}; }
+  Real energy(const Points<2>& p) const {
+    const Real stretch = (p.col(1) - p.col(0)).norm() - length;
+    return stretch * stretch;
+  }
+  Real energy_and_gradient(const Points<2>& p, Gradient<2>& g) const {
+    const Vector3 edge = p.col(1) - p.col(0);
+    const Vector3 slope = (edge.norm() - length) / edge.norm() * edge;  // a factor of 2 is missing
+    g << -slope, slope;
+    return energy(p);
+  }
+  Hessian<2> energy_hessian(const Points<2>&) const { return Hessian<2>::Zero(); }
+  Real length = 0;
+};
+
+TEST(PotentialField, RefusesAnEnergyWhoseGradientIsWrongAndSaysBothNumbers) {
+  PotentialField field((Eigen::Matrix3Xd(3, 2) << 0, 1, 0, 0, 0, 0).finished());
+  const std::string message =
+      complaint<std::invalid_argument>([&] { field.add<WrongEnergy>(std::vector<Edge>{{0, 1}}, 1); });
+  EXPECT_TRUE(message.starts_with("wrong energy 0: near rest, dpsi/dp")) << message;
+  EXPECT_NE(message.find("central differences give"), std::string::npos) << message;
   EXPECT_TRUE(field.potentials().empty());
 }
 

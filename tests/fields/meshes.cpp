@@ -29,19 +29,11 @@ std::vector<Real> random_inverse_masses(Eigen::Index particles, Random& random) 
   return inverse_masses;
 }
 
-BlockMatrix assembled(const Potential& potential, const PackedVectors& x, StiffnessModel model) {
-  std::vector<std::pair<int, int>> pattern;
-  potential.append_pattern(pattern);
-  BlockMatrix k(static_cast<int>(x.cols()), std::move(pattern));
-  potential.add_stiffness(x, model, k);
-  return k;
-}
-
-Real true_largest_eigenvalue(const Potential& potential, const PackedVectors& x,
+Real true_largest_eigenvalue(const PotentialField& field, const PackedVectors& x,
                              const std::vector<Real>& inverse_masses) {
   Eigen::VectorXd scale(3 * x.cols());
   for (Eigen::Index i = 0; i < x.cols(); ++i) scale.segment<3>(3 * i).setConstant(std::sqrt(inverse_masses[i]));
-  const Eigen::MatrixXd k = assembled(potential, x, StiffnessModel::gauss_newton).to_dense();
+  const Eigen::MatrixXd k = assembled(field, x, StiffnessModel::gauss_newton).to_dense();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * k * scale.asDiagonal();
   return symmetric_eigenvalues(scaled).maxCoeff();
 }

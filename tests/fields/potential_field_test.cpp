@@ -37,41 +37,36 @@ TEST(PotentialField, IsTheSumOfItsBatches) {
   const PackedVectors v = random_packed(b.size(), 1, random);
   const std::vector<Real> inverse_masses = random_inverse_masses(b.size(), random);
   const auto none = [&] { return PackedVectors(PackedVectors::Zero(4, b.size())); };
-  PackedVectors f = none(), damping = none(), product = none(), diagonal = none(), dissipated = v;
+  PackedVectors f = none(), damping = none(), product = none(), dissipated = v;
   std::vector<Real> values, bounds(b.size(), 0.0);
   Real energy = 0;
   std::size_t elements = 0;
   Eigen::MatrixXd k = Eigen::MatrixXd::Zero(3 * b.size(), 3 * b.size());
   for (const auto& batch : b.field.potentials()) {
     energy += batch->add_forces(b.x, f);
-    batch->add_damping_forces(b.x, v, 0.1, damping);
-    batch->add_stiffness_product(b.x, StiffnessModel::exact, v, 2, product);
-    batch->add_stiffness_diagonal(b.x, 3, diagonal);
-    batch->add_stiffness_bounds(b.x, bounds);
+    damping += damping_forces(*batch, b.x, v, 0.1);
+    batch->add_product(b.x, StiffnessModel::exact, v, 2, product);
+    batch->add_bounds(b.x, bounds);
     batch->dissipate(b.x, inverse_masses, 0.1, 0.1, dissipated);
-    batch->append_strains(b.x, values);
+    for (const Real strain : strains(*batch, b.x)) values.push_back(strain);
     elements += batch->num_elements();
     k += assembled(*batch, b.x, StiffnessModel::exact).to_dense();
   }
-  PackedVectors sum_f = none(), sum_damping = none(), sum_product = none(), sum_diagonal = none(), sum_dissipated = v;
-  std::vector<Real> sum_values, sum_bounds(b.size(), 0.0);
+  PackedVectors sum_f = none(), sum_product = none(), sum_dissipated = v;
+  std::vector<Real> sum_bounds(b.size(), 0.0);
   EXPECT_GT(energy, 0);
   EXPECT_DOUBLE_EQ(b.field.add_forces(b.x, sum_f), energy);
   EXPECT_DOUBLE_EQ(b.field.energy(b.x), energy);
-  b.field.add_damping_forces(b.x, v, 0.1, sum_damping);
-  b.field.add_stiffness_product(b.x, StiffnessModel::exact, v, 2, sum_product);
-  b.field.add_stiffness_diagonal(b.x, 3, sum_diagonal);
-  b.field.add_stiffness_bounds(b.x, sum_bounds);
+  b.field.add_product(b.x, StiffnessModel::exact, v, 2, sum_product);
+  b.field.add_bounds(b.x, sum_bounds);
   b.field.dissipate(b.x, inverse_masses, 0.1, 0.1, sum_dissipated);
-  b.field.append_strains(b.x, sum_values);
-  for (const PackedVectors* value : {&f, &damping, &product, &diagonal}) ASSERT_GT(value->norm(), 0);
+  for (const PackedVectors* value : {&f, &damping, &product}) ASSERT_GT(value->norm(), 0);
   EXPECT_EQ(sum_f, f);
-  EXPECT_EQ(sum_damping, damping);
+  EXPECT_LT(relative_error(damping_forces(b.field, b.x, v, 0.1), damping), 1e-14);
   EXPECT_EQ(sum_product, product);
-  EXPECT_EQ(sum_diagonal, diagonal);
   EXPECT_EQ(sum_bounds, bounds);
   EXPECT_EQ(sum_dissipated, dissipated);
-  EXPECT_EQ(sum_values, values);
+  EXPECT_EQ(strains(b.field, b.x), values);
   EXPECT_EQ(b.field.num_elements(), elements);
   EXPECT_EQ(values.size(), elements);
   EXPECT_LT(relative_error(assembled(b.field, b.x, StiffnessModel::exact).to_dense(), k), 1e-15);
@@ -129,7 +124,7 @@ TEST(PotentialField, DifferentialOfTheForcesIsTheStiffnessTimesTheDisplacement) 
     for (const StiffnessModel model : all_models) {
       PackedVectors from_matrix = PackedVectors::Zero(4, b.size()), matrix_free = from_matrix;
       assembled(b.field, b.x, model).add_product(dx, -0.5, from_matrix);
-      b.field.add_stiffness_product(b.x, model, dx, -0.5, matrix_free);
+      b.field.add_product(b.x, model, dx, -0.5, matrix_free);
       ASSERT_GT(from_matrix.norm(), 0);
       matrix_error.see(relative_error(matrix_free, from_matrix), seed);
       if (model == StiffnessModel::exact) {
@@ -164,7 +159,7 @@ TEST(PotentialField, AssembledStiffnessIsSymmetricAndSemidefiniteWhereItShouldBe
 TEST(PotentialField, DiagonalIsThatOfTheGaussNewtonStiffness) {
   const Body b = Body::random(4);
   PackedVectors diagonal = PackedVectors::Constant(4, b.size(), 1);
-  b.field.add_stiffness_diagonal(b.x, 2, diagonal);
+  assembled(b.field, b.x, StiffnessModel::gauss_newton).add_diagonal(2, diagonal);
   const Eigen::VectorXd expected = assembled(b.field, b.x, StiffnessModel::gauss_newton).to_dense().diagonal();
   ASSERT_GT(expected.minCoeff(), 0);
   EXPECT_LT(relative_error((diagonal.topRows<3>().array() - 1).matrix().reshaped() / 2, expected), 1e-14);
@@ -178,7 +173,7 @@ TEST(PotentialField, BoundsAreNeverBelowTheLargestEigenvalue) {
     for (const PackedVectors& x : {b.x, b.field.rest_positions()}) {
       const std::vector<Real> inverse_masses = random_inverse_masses(b.size(), random);
       std::vector<Real> bounds(b.size(), 0.0);
-      b.field.add_stiffness_bounds(x, bounds);
+      b.field.add_bounds(x, bounds);
       Real bound = 0;
       for (Eigen::Index i = 0; i < b.size(); ++i) bound = std::max(bound, bounds[i] * inverse_masses[i]);
       const Real largest = true_largest_eigenvalue(b.field, x, inverse_masses);
@@ -197,6 +192,71 @@ TEST(PotentialField, FindGivesTheBatchOfAKindOrNull) {
   EXPECT_EQ(field.find<TetrahedronVolume>(), nullptr);
   EXPECT_EQ(added.stiffnesses(), (std::vector<Real>{2, 2}));
   EXPECT_NEAR(added.kinds()[0].rest_length(), std::sqrt(2.0), 1e-15);
+}
+
+TEST(PotentialField, BatchGivesTheBatchOrSaysWhatThereIs) {
+  PotentialField field(Eigen::Matrix3Xd::Identity(3, 3));
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { field.batch<Length>(); }),
+            "field: no batch of the kind \"length\"; there is nothing");
+  Batch<Length>& added = field.add<Length>(std::vector<Edge>{{0, 1}, {1, 2}}, 2);
+  field.add<Length>(std::vector<Edge>{{0, 2}}, 1, "brace");
+  EXPECT_EQ(&field.batch<Length>(), &added);
+  EXPECT_EQ(field.batch("brace").num_elements(), 1u);
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { field.batch<TetrahedronVolume>(); }),
+            "field: no batch of the kind \"tetrahedron volume\"; there is \"length\", \"brace\"");
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { std::as_const(field).batch("muscle"); }),
+            "field: no batch \"muscle\"; there is \"length\", \"brace\"");
+}
+
+// Who steps a field remembers what he knows of it.
+static_assert(!std::is_assignable_v<PotentialField&, PotentialField>);
+
+TEST(PotentialField, TakesInAnotherFieldOfTheSameParticles) {
+  const Body b = Body::random(6);
+  PotentialField both = make_elastic_field(b.mesh.vertices, b.mesh.tetrahedra, 2.0);
+  const Real of_one = both.energy(b.x);
+  both.add(make_elastic_field(b.mesh.vertices, b.mesh.tetrahedra, Material{.young = 1e3, .poisson = 0.4}));
+  EXPECT_DOUBLE_EQ(both.energy(b.x), of_one + b.field.energy(b.x));
+  EXPECT_EQ(both.potentials().size(), 4u);
+  EXPECT_EQ(complaint<std::invalid_argument>([&] { both.add(PotentialField(Eigen::Matrix3Xd::Zero(3, 7))); }),
+            "field: the field to be added has 7 particles, this one " + std::to_string(both.num_particles()));
+}
+
+// The least that a potential of a user's own has to have: gravity as a potential, -m g . x.
+class Weight final : public Potential {
+ public:
+  Weight() : Potential("weight") {}
+  Real energy(const Positions& x) const override { return 9.81 * x.row(1).sum(); }
+  Real add_forces(const Positions& x, Forces f) const override {
+    f.row(1).array() -= 9.81;
+    return energy(x);
+  }
+  void add_stiffness(const Positions&, StiffnessModel, System&) const override {}
+  void add_product(const Positions&, StiffnessModel, const Vectors&, Real, Forces) const override {}
+  void add_bounds(const Positions&, std::span<Real>) const override {}
+};
+
+TEST(PotentialField, TakesAnyPotential) {
+  Body b = Body::random(7);
+  const Real before = b.field.energy(b.x);
+  b.field.add(std::make_unique<Weight>());
+  EXPECT_DOUBLE_EQ(b.field.energy(b.x), before + 9.81 * b.x.row(1).sum());
+  EXPECT_EQ(ledger(b.field, b.x).back().name, "weight");
+  EXPECT_EQ(b.field.state().values.size(), 10u) << "five counts a batch, and nothing of the weight";
+  EXPECT_FALSE(b.field.damps() || b.field.evolves());
+}
+
+TEST(OwnKinds, AreRegisteredByName) {
+  std::set<std::string_view> names;
+  for (const KindEntry& kind : own_kinds()) {
+    names.insert(kind.name);
+    const auto batch = kind.make(9, "mine");
+    EXPECT_EQ(batch->name(), "mine");
+    EXPECT_EQ(batch->num_elements(), 0u);
+  }
+  EXPECT_EQ(names.size(), own_kinds().size()) << "two kinds of one name";
+  EXPECT_TRUE(names.contains(Length::name) && names.contains(ShapeMatch::name) &&
+              names.contains(StableNeoHookean::name));
 }
 
 TEST(PotentialField, PositionsThatAreNotFiniteGiveAnEnergyThatIsNotFinite) {

@@ -1,4 +1,4 @@
-#include "penalty/fields/two_phase.h"
+// Fields of two phases: soft far from rest, stiff near it.
 
 #include "fields/meshes.h"
 
@@ -10,7 +10,6 @@ const Material rubber{.young = 1e5, .poisson = 0.45};
 struct Cube {
   TetMesh mesh = make_box({1, 1, 1}, {2, 2, 2});
   PotentialField field = make_recovering_field(mesh.vertices, mesh.tetrahedra, rubber);
-  TwoPhase& phases = dynamic_cast<TwoPhase&>(*field.potentials()[0]);
 
   PackedVectors stretched(Real x, Real y = 1) const {
     PackedVectors positions = field.rest_positions();
@@ -27,14 +26,14 @@ TEST(TwoPhase, IsTheStiffMaterialNearRest) {
   Random random(1);
   const PackedVectors x = deformed(cube.field.rest_positions(), 0.01, random);
   EXPECT_EQ(cube.field.choose_phase(x), 0);
-  EXPECT_FALSE(cube.phases.is_soft());
+  EXPECT_FALSE(cube.field.is_soft());
   EXPECT_EQ(cube.field.energy(x), stiff.energy(x));
 }
 
 TEST(TwoPhase, KeepsTheShearModulusWhereItIsSoft) {
   Cube cube;
   cube.field.choose_phase(cube.stretched(3));
-  ASSERT_TRUE(cube.phases.is_soft());
+  ASSERT_TRUE(cube.field.is_soft());
   PackedVectors sheared = cube.field.rest_positions();
   sheared.row(0) += 1e-4 * cube.field.rest_positions().row(1);
   // Simple shear g of 1 m³: mu g² / 2.
@@ -48,7 +47,7 @@ TEST(TwoPhase, ChangesWithHysteresis) {
   Cube cube;
   const auto is_soft_at = [&](Real stretch) {
     cube.field.choose_phase(cube.stretched(stretch));
-    return cube.phases.is_soft();
+    return cube.field.is_soft();
   };
   EXPECT_FALSE(is_soft_at(1.85));
   EXPECT_TRUE(is_soft_at(1.95));
@@ -59,8 +58,8 @@ TEST(TwoPhase, ChangesWithHysteresis) {
   EXPECT_TRUE(is_soft_at(0.65));
   EXPECT_FALSE(is_soft_at(0.75));
   EXPECT_TRUE(is_soft_at(-1)) << "mirrored: no length differs, and yet";
-  EXPECT_NEAR(cube.phases.largest_strain(cube.stretched(-1)), 2, 1e-12);
-  EXPECT_NEAR(cube.phases.largest_strain(cube.stretched(1.2, 0.7)), 0.3, 1e-12);
+  EXPECT_NEAR(cube.field.largest_strain(cube.stretched(-1)), 2, 1e-12);
+  EXPECT_NEAR(cube.field.largest_strain(cube.stretched(1.2, 0.7)), 0.3, 1e-12);
 }
 
 TEST(TwoPhase, SaysWhatTheChangeAddsToTheEnergy) {
@@ -75,20 +74,47 @@ TEST(TwoPhase, SaysWhatTheChangeAddsToTheEnergy) {
 
 TEST(TwoPhase, GoesBackToTheStateThatWasSaved) {
   Cube cube;
-  cube.field.save_state();
+  const FieldState near = cube.field.state();
   cube.field.choose_phase(cube.stretched(3));
-  ASSERT_TRUE(cube.phases.is_soft());
-  cube.field.restore_state();
-  EXPECT_FALSE(cube.phases.is_soft());
+  ASSERT_TRUE(cube.field.is_soft());
+  const FieldState far = cube.field.state();
+  cube.field.set_state(near);
+  EXPECT_FALSE(cube.field.is_soft());
+  cube.field.set_state(far);
+  EXPECT_TRUE(cube.field.is_soft());
+}
+
+TEST(TwoPhase, FindLooksIntoBothPhasesTheStiffOneFirst) {
+  Cube cube;
+  const Batch<StableNeoHookean>* found = cube.field.find<StableNeoHookean>();
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found, cube.field.potentials()[1].get());
+  EXPECT_NEAR(found->kinds()[0].lambda_over_mu, rubber.lame_lambda() / rubber.lame_mu(), 1e-12);
+  EXPECT_EQ(&cube.field.batch("stable neo-Hookean"), found);
+  PotentialField springs =
+      make_recovering_field(cube.mesh.vertices, cube.mesh.tetrahedra, rubber, ElasticModel::springs_volumes);
+  springs.batch<Length>().set_target(0, 0.1);
+  EXPECT_GT(springs.energy(springs.rest_positions()), 0);
+}
+
+TEST(TwoPhase, IsTakenInByAnotherFieldWithItsSwitch) {
+  Cube cube, other;
+  const PackedVectors x = cube.stretched(3);
+  cube.field.add(std::move(other.field));
+  const Real near = cube.field.energy(x);
+  const Real added = cube.field.choose_phase(x);
+  EXPECT_LT(added, 0);
+  EXPECT_NEAR(cube.field.energy(x), near + added, 1e-12 * near);
+  EXPECT_TRUE(cube.field.acts(0) && !cube.field.acts(1) && cube.field.acts(2) && !cube.field.acts(3));
 }
 
 TEST(TwoPhase, IsJudgedByItsStiffPhaseWhicheverActs) {
   Cube cube;
   const PackedVectors& rest = cube.field.rest_positions();
   std::vector<Real> stiff(27, 0), soft(27, 0);
-  cube.field.add_stiffness_bounds(rest, stiff);
+  cube.field.add_bounds(rest, stiff);
   cube.field.choose_phase(cube.stretched(3));
-  cube.field.add_stiffness_bounds(rest, soft);
+  cube.field.add_bounds(rest, soft);
   EXPECT_EQ(stiff, soft);
   EXPECT_GT(assembled(cube.field, rest, StiffnessModel::taut).to_dense().norm(),
             1.5 * assembled(cube.field, rest, StiffnessModel::exact).to_dense().norm());
@@ -99,15 +125,12 @@ TEST(TwoPhase, ListsBothPhasesAndCountsTheOneThatActs) {
   for (const Real stretch : {1.0, 3.0}) {
     const PackedVectors x = cube.stretched(1.05);
     cube.field.choose_phase(cube.stretched(stretch));
-    std::vector<Real> energies, strains;
-    std::vector<LedgerEntry> ledger;
-    cube.field.append_energies(x, energies);
-    cube.field.append_strains(x, strains);
-    cube.field.append_ledger(x, ledger);
+    const std::vector<Real> energies = penalty::energies(cube.field, x), strains = penalty::strains(cube.field, x);
+    const std::vector<LedgerEntry> ledger = penalty::ledger(cube.field, x);
     ASSERT_EQ(energies.size(), cube.field.num_elements());
     ASSERT_EQ(strains.size(), cube.field.num_elements());
     ASSERT_EQ(ledger.size(), 2u);
-    const std::size_t acts = cube.phases.is_soft() ? 0 : 1;
+    const std::size_t acts = cube.field.is_soft() ? 0 : 1;
     EXPECT_EQ(ledger[acts].num_enabled, 40u);
     EXPECT_EQ(ledger[1 - acts].num_enabled, 0u);
     EXPECT_EQ(ledger[1 - acts].energy, 0);
@@ -121,20 +144,22 @@ TEST(TwoPhase, ListsBothPhasesAndCountsTheOneThatActs) {
 TEST(TwoPhase, RefusesWhatDoesNotFitTogether) {
   const TetMesh one = make_box({1, 1, 1}, {1, 1, 1}), two = make_box({1, 1, 1}, {2, 1, 1});
   const auto field_of = [](const TetMesh& mesh) { return make_elastic_field(mesh.vertices, mesh.tetrahedra, rubber); };
-  const auto complaint_of = [&](const TetMesh& soft, const PhaseThresholds& thresholds) {
-    return complaint<std::invalid_argument>(
-        [&] { TwoPhase(one.tetrahedra, field_of(soft), field_of(one), thresholds); });
+  const auto complaint_of = [&](std::span<const Tetrahedron> tetrahedra, PotentialField soft,
+                                const PhaseThresholds& thresholds = {}) {
+    PotentialField field = field_of(one);
+    const std::string message =
+        complaint<std::invalid_argument>([&] { field.add_soft_phase(tetrahedra, std::move(soft), thresholds); });
+    EXPECT_EQ(field.potentials().size(), 2u) << "a refused phase was added";
+    return message;
   };
-  EXPECT_EQ(complaint_of(two, {}), "two phases: the soft field has 12 particles, the stiff one 8");
-  EXPECT_EQ(complaint_of(one, {.enter = 0.2}),
+  EXPECT_EQ(complaint_of(one.tetrahedra, field_of(two)), "field: the soft phase has 12 particles, this one 8");
+  EXPECT_EQ(complaint_of(one.tetrahedra, field_of(one), {.enter = 0.2}),
             "two phases: thresholds are 0.2 to enter and 0.3 to leave, must be 0 < leave <= enter");
-  EXPECT_EQ(complaint<std::invalid_argument>([&] {
-              TwoPhase(two.tetrahedra, field_of(one), field_of(one));
-            }).rfind("two phases: tetrahedron ", 0),
-            0u);
+  EXPECT_TRUE(complaint_of(two.tetrahedra, field_of(one)).starts_with("two phases: tetrahedron "));
   const std::vector<Tetrahedron> flat{{0, 1, 2, 1}};
-  EXPECT_EQ(complaint<std::invalid_argument>([&] { TwoPhase(flat, field_of(one), field_of(one)); }),
-            "two phases: tetrahedron 0 has no volume at rest");
+  EXPECT_EQ(complaint_of(flat, field_of(one)), "two phases: tetrahedron 0 has no volume at rest");
+  EXPECT_EQ(complaint_of(one.tetrahedra, make_recovering_field(one.vertices, one.tetrahedra, rubber)),
+            "field: one of the phases is of two phases itself");
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
-// Lets the n-th allocation of a program fail. Include it in one source file of the program: it replaces operator new there, and,
-// without an address sanitizer, the malloc that Eigen calls. What libraries allocate that are linked dynamically, Bullet among
-// them, never fails: they do not know what to do then.
+// Lets the n-th allocation of a program fail. Include it in one source file of the program: it replaces operator new
+// there, and, without an address sanitizer, the malloc that Eigen calls. What libraries allocate that are linked
+// dynamically, Bullet among them, never fails: they do not know what to do then.
 #pragma once
 #include <cstdlib>
 #include <new>

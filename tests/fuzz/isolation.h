@@ -18,9 +18,9 @@ struct IsolationResult {
   std::uint64_t done = 0, failed = 0;
 };
 
-/// Calls `trial` with the numbers first, first + 1, ... A trial fails if it throws, ends by a signal, exits or takes too
-/// long; each failure is printed on standard error in one line. A child process takes trials one after another until it
-/// dies, and what the leak checker says at its end counts as one more failure.
+/// Calls `trial` with the numbers first, first + 1, ... A trial fails if it throws, ends by a signal, exits or takes
+/// too long; each failure is printed on standard error in one line. A child process takes trials one after another
+/// until it dies, and what the leak checker says at its end counts as one more failure.
 IsolationResult run_isolated(const IsolationOptions& options, const std::function<void(std::uint64_t)>& trial);
 
 }  // namespace penalty::testing

@@ -2,10 +2,10 @@
 //
 //   nth_allocation [--most N] [--stride N]
 //
-// Out of a call comes std::bad_alloc; out of a step comes nothing. Afterwards bodies are where they were (after a step: or
-// where it should have taken them), the next steps are finite, nodes are where particles are, and nothing is leaked. `--most`
-// is the largest n, `--stride` the distance of those that are tried. The status is 0 if nothing was found, 1 if something
-// was, 2 for arguments that make no sense.
+// Out of a call comes std::bad_alloc; out of a step comes nothing. Afterwards bodies are where they were (after a step:
+// or where it should have taken them), the next steps are finite, nodes are where particles are, and nothing is leaked.
+// `--most` is the largest n, `--stride` the distance of those that are tried. The status is 0 if nothing was found, 1
+// if something was, 2 for arguments that make no sense.
 #include "bullet/simulation.h"  // first: see there
 
 #include <fstream>
@@ -82,15 +82,7 @@ struct Call {
 
 void world_step(Stage& stage) { stage.sim.step(1.0 / 60); }
 
-template <class Field>
-void save_and_restore(Field& field) {
-  if constexpr (requires { field.set_state(field.state()); }) {
-    field.set_state(field.state());
-  } else {
-    field.save_state();
-    field.restore_state();
-  }
-}
+void save_and_restore(PotentialField& field) { field.set_state(field.state()); }
 
 const std::vector<Call>& calls() {
   static const std::vector<Call> all{

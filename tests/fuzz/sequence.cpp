@@ -157,7 +157,7 @@ AttachOptions Sequence::random_options(Body& body) {
     step.newton_tolerance = chance_.number(1e-6, 0.1);
   }
   if (chance_.one_in(6)) {
-    ContactPoint point = ContactPoint::at_particle(chance_.index(static_cast<int>(body.mesh.vertices.cols())));
+    WeightedPoint point = WeightedPoint::at_particle(chance_.index(static_cast<int>(body.mesh.vertices.cols())));
     if (!legal() && chance_.one_in(3)) point.weights[0] = chance_.anything();
     options.contact_points = {point};
   }

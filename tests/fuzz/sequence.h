@@ -14,10 +14,11 @@
 
 namespace penalty::testing {
 
-/// Everything that happens follows from the seed: the manner, one or two worlds and of which kind, bodies, rigid bodies and
-/// calls. Throws Finding when a promise is broken:
+/// Everything that happens follows from the seed: the manner, one or two worlds and of which kind, bodies, rigid bodies
+/// and calls. Throws Finding when a promise is broken:
 ///
-/// - no exception leaves a step, and none but std::invalid_argument (of one line; after misuse std::logic_error) any other
+/// - no exception leaves a step, and none but std::invalid_argument (of one line; after misuse std::logic_error) any
+/// other
 ///   call; in the legal manner none;
 /// - particles are finite, always; nodes are finite after a step into which nothing went that was not;
 /// - nodes are where particles are;

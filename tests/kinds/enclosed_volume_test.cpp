@@ -5,7 +5,8 @@
 #include <numbers>
 #include <set>
 
-#include "kinds/dynamic_differences.h"
+#include "kinds/samples.h"
+#include "penalty/math/finite_difference.h"
 
 namespace penalty::testing {
 namespace {
@@ -104,15 +105,16 @@ TEST(EnclosedVolume, GradientAndHessianAreTheDerivatives) {
     const Points<dynamic> p = size * noisy(s.points, seed);
     const Gradient<dynamic> gradient = kind.gradient(p);
     ASSERT_GT(gradient.norm() * size, 0.1);
-    gradient_error.see(
-        relative_error(differences_of_value([&](const auto& q) { return kind.value(q); }, p, 1e-5 * size), gradient),
-        seed);
+    gradient_error.see(relative_error(central_difference_gradient<dynamic>([&](const auto& q) { return kind.value(q); },
+                                                                           p, 1e-5 * size),
+                                      gradient),
+                       seed);
     const Hessian<dynamic> hessian = kind.hessian(p);
     ASSERT_GT(hessian.norm() * size * size, 0.1);
-    hessian_error.see(
-        relative_error(differences_of_gradient([&](const auto& q) { return kind.gradient(q); }, p, 1e-5 * size),
-                       hessian),
-        seed);
+    hessian_error.see(relative_error(central_difference_hessian<dynamic>(
+                                         [&](const auto& q) { return kind.gradient(q); }, p, 1e-5 * size),
+                                     hessian),
+                      seed);
     asymmetry.see(relative_error(hessian.transpose(), hessian), seed);
   }
   gradient_error.expect_below(1e-8, "gradient");
@@ -136,8 +138,8 @@ TEST(EnclosedVolume, HasNoNetForceAndNoNetTorqueFarFromTheOrigin) {
     const Points<dynamic> p = noisy(s.points, seed).colwise() + 1e4 * Random(seed).direction();
     const EnclosedVolume kind = EnclosedVolume(s.triangles).at_rest(s.points);
     const Gradient<dynamic> gradient = kind.gradient(p);
-    force.see(net_sum(gradient), seed);
-    torque.see(net_moment(p, gradient), seed);
+    force.see(net_force<dynamic>(gradient), seed);
+    torque.see(net_torque<dynamic>(p, gradient), seed);
     const Points<dynamic> near = p.colwise() - p.col(0).eval();  // exact up to the rounding of p itself
     value.see(std::abs(kind.value(p) - kind.value(near)), seed);
   }

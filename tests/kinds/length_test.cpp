@@ -49,9 +49,7 @@ TEST(Length, NearlyCoincidentPointsKeepTheirOwnDirection) {
 }
 
 TEST(Length, RefusesAZeroRestLengthByName) {
-  EXPECT_EQ(complaint<std::invalid_argument>([] {
-              Length::at_rest(segment({1, 2, 3}, {1, 2, 3}));
-            }),
+  EXPECT_EQ(complaint<std::invalid_argument>([] { Length::at_rest(segment({1, 2, 3}, {1, 2, 3})); }),
             "length: rest length is 0");
 }
 

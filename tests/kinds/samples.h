@@ -1,4 +1,5 @@
-// Random elements of any kind: at rest, stretched, compressed, inverted, somewhere else; of any size and anywhere.
+// Random elements of any kind of the list: at rest, stretched, compressed, inverted, somewhere else; of any size and
+// anywhere.
 #pragma once
 #include <stdexcept>
 #include <tuple>
@@ -8,63 +9,76 @@
 
 namespace penalty::testing {
 
-template <class List>
-struct TypesOf;
-template <class... Kinds>
-struct TypesOf<KindList<Kinds...>> {
-  using type = ::testing::Types<Kinds...>;
+/// The kinds of a list for which Keep<Kind>::value is true, as GoogleTest wants them.
+template <class List, template <class> class Keep>
+struct TypesThat;
+template <class... Kinds, template <class> class Keep>
+struct TypesThat<KindList<Kinds...>, Keep> {
+  template <class... Types>
+  static ::testing::Types<Types...> listed(std::tuple<Types...>);
+  using type = decltype(listed(
+      std::tuple_cat(std::declval<std::conditional_t<Keep<Kinds>::value, std::tuple<Kinds>, std::tuple<>>>()...)));
 };
-using KindTypes = TypesOf<AllKinds>::type;
+
+template <class Kind>
+struct Any : std::true_type {};
+using KindTypes = TypesThat<OwnKinds, Any>::type;
+
+/// Constraints of few points: what the chain rule makes dense matrices of.
+template <class Kind>
+struct IsFixedConstraint : std::bool_constant<Constraint<Kind> && Kind::num_points != dynamic> {};
+using ConstraintTypes = TypesThat<OwnKinds, IsFixedConstraint>::type;
+
+/// Those that nothing outside holds.
+template <class Kind>
+struct IsInternal : std::bool_constant<IsFixedConstraint<Kind>::value && conserves_momentum<Kind>> {};
+using InternalTypes = TypesThat<OwnKinds, IsInternal>::type;
 
 enum class Shape { noisy, stretched, compressed, inverted, anywhere };
 inline constexpr unsigned num_shapes = 5;
 inline constexpr unsigned num_samples = 500;
 
-/// Makes rest states of any kind, also of one with parameters: of points in a region of `size` [m].
-template <Constraint Kind>
-Kind prototype(Real size) {
-  if constexpr (std::same_as<Kind, Distance>)
-    return Distance::to(size * Vector3::Ones());
+/// What a kind measures: C, or of an energy of its own psi.
+template <ElementKind Kind>
+Real measure(const Kind& kind, const Points<Kind::num_points>& p) {
+  if constexpr (Constraint<Kind>)
+    return kind.value(p);
   else
-    return Kind{};
+    return kind.energy(p);
 }
 
-/// Whether net force and net torque vanish: always, unless the kind says that something outside holds it.
-template <class Kind>
-inline constexpr bool conserves_momentum = [] {
-  if constexpr (requires { Kind::conserves_momentum; })
-    return Kind::conserves_momentum;
-  else
-    return true;
-}();
+template <ElementKind Kind>
+Gradient<Kind::num_points> gradient_of(const Kind& kind, const Points<Kind::num_points>& p) {
+  if constexpr (Constraint<Kind>) {
+    return kind.gradient(p);
+  } else {
+    Gradient<Kind::num_points> g(3, p.cols());
+    kind.energy_and_gradient(p, g);
+    return g;
+  }
+}
 
-/// The kinds that nothing outside holds.
-template <class List>
-struct InternalTypesOf;
-template <class... Kinds>
-struct InternalTypesOf<KindList<Kinds...>> {
-  template <class... Types>
-  static ::testing::Types<Types...> listed(std::tuple<Types...>);
-  template <class Kind>
-  using Kept = std::conditional_t<conserves_momentum<Kind>, std::tuple<Kind>, std::tuple<>>;
-  using type = decltype(listed(std::tuple_cat(std::declval<Kept<Kinds>>()...)));
-};
-using InternalKindTypes = InternalTypesOf<AllKinds>::type;
+template <class Kind>
+inline constexpr bool has_hessian = HasHessian<Kind> || ElasticEnergy<Kind>;
+
+template <ElementKind Kind>
+Hessian<Kind::num_points> hessian_of(const Kind& kind, const Points<Kind::num_points>& p) {
+  if constexpr (Constraint<Kind>)
+    return kind.hessian(p);
+  else
+    return kind.energy_hessian(p);
+}
 
 /// The same element elsewhere: what a kind holds besides its points moves with them.
-template <Constraint Kind>
-Kind moved(Kind kind, const Matrix3& rotation, const Vector3& translation) {
-  if constexpr (std::same_as<Kind, Distance>) kind.target = rotation * kind.target + translation;
-  return kind;
+template <ElementKind Kind>
+Kind moved(const Kind& kind, const Matrix3& rotation, const Vector3& translation) {
+  if constexpr (requires { kind.moved(rotation, translation); })
+    return kind.moved(rotation, translation);
+  else
+    return kind;
 }
 
-template <class Kind>
-inline constexpr bool wraps = std::same_as<Kind, TetrahedronDihedralAngle> || std::same_as<Kind, BendingAngle>;
-template <class Kind>
-inline constexpr bool is_singular_where_flat =
-    wraps<Kind> || std::same_as<Kind, CornerAngle> || std::same_as<Kind, TriangleArea>;
-
-template <Constraint Kind>
+template <ElementKind Kind>
 struct Sample {
   static constexpr int num_points = Kind::num_points;
 
@@ -77,53 +91,54 @@ struct Sample {
   Real difference_step() const { return 6e-6 * size; }
 };
 
-// Without short legs or flat corners: the gradient of C there, at rest, is not large.
-template <Constraint Kind>
+// Whether differences a few 1e-6 apart can be compared with derivatives at these points, some 1 m in size: neither
+// gradient nor Hessian is large, as next to a point where a triangle has no normal, and an angle is not about to jump
+// by a turn.
+template <ElementKind Kind>
+bool is_smooth_around(const Kind& kind, const Points<Kind::num_points>& points) {
+  constexpr Real steepest = Constraint<Kind> ? 20 : 400;  // energies go with the square
+  if (!(gradient_of(kind, points).colwise().norm().sum() < steepest)) return false;
+  if constexpr (has_hessian<Kind>)
+    if (!(hessian_of(kind, points).norm() < 20 * steepest)) return false;
+  return period_of<Kind> == 0 || std::abs(measure(kind, points)) < period_of<Kind> / 2 - 0.04;
+}
+
+template <ElementKind Kind>
 bool is_well_shaped(const Points<Kind::num_points>& points) {
   try {
-    return prototype<Kind>(1).at_rest(points).gradient(points).colwise().norm().sum() < 20;
+    return is_smooth_around(example_of<Kind>(1).at_rest(points), points);
   } catch (const std::invalid_argument&) {
     return false;
   }
 }
 
 // In a cube of side 1.
-template <Constraint Kind>
+template <ElementKind Kind>
 Points<Kind::num_points> well_shaped_points(Random& random) {
-  Points<Kind::num_points> points;
-  do points = random.vectors<Kind::num_points>(Kind::num_points, 0.5);
-  while (!is_well_shaped<Kind>(points));
-  return points;
-}
-
-// Whether differences of C, a few 1e-6 apart, can be compared with derivatives: not next to a point where a triangle
-// has no normal, nor where an angle jumps by a turn.
-template <Constraint Kind>
-bool is_smooth_around(const Kind& kind, const Points<Kind::num_points>& points) {
-  if constexpr (is_singular_where_flat<Kind>)
-    if (!is_well_shaped<Kind>(points)) return false;
-  if constexpr (std::same_as<Kind, CornerAngle>)  // its gradient stays small up to 0 and pi, its Hessian does not
-    if (!is_well_shaped<TriangleArea>(points)) return false;
-  return !wraps<Kind> || std::abs(kind.value(points)) < 3.1;
+  for (;;) {
+    const Points<Kind::num_points> points = random.vectors<Kind::num_points>(num_example_points<Kind>, 0.5);
+    if (is_well_shaped<Kind>(points)) return points;
+  }
 }
 
 // A draw that is not smooth is drawn again, so that every seed gives a sample of its shape.
-template <Constraint Kind>
+template <ElementKind Kind>
 Sample<Kind> sample(unsigned seed) {
   constexpr int n = Kind::num_points;
+  constexpr int count = num_example_points<Kind>;
   Random random(seed);
   const Shape shape = static_cast<Shape>(seed % num_shapes);
   const Real size = std::pow(10.0, random.uniform(-3, 3));
   Points<n> rest, points;
   do {
     rest = well_shaped_points<Kind>(random);
-    if constexpr (n > 1)
-      if (seed / num_shapes % 2 == 1) rest.col(n - 1).swap(rest.col(n - 2));  // the other orientation
+    if constexpr (count > 1)
+      if (seed / num_shapes % 2 == 1) rest.col(count - 1).swap(rest.col(count - 2));  // the other orientation
     const Vector3 axis = random.direction();
     const auto along_axis = [&](Real factor) -> Matrix3 {
       return Matrix3::Identity() + (factor - 1) * axis * axis.transpose();
     };
-    const Points<n> noise = random.vectors<n>(n, 0.05);
+    const Points<n> noise = random.vectors<n>(count, 0.05);
     switch (shape) {
       case Shape::noisy:
         points = rest + noise;
@@ -141,14 +156,14 @@ Sample<Kind> sample(unsigned seed) {
         points = well_shaped_points<Kind>(random);
         break;
     }
-  } while (!is_smooth_around(prototype<Kind>(1).at_rest(rest), points));
+  } while (!is_well_shaped<Kind>(rest) || !is_smooth_around(example_of<Kind>(1).at_rest(rest), points));
   const Points<n> turned = random.rotation() * points;
   const Vector3 away = random.vector(2);
   points = turned.colwise() + away;
-  return {seed, shape, size, size * rest, size * points, prototype<Kind>(size).at_rest(size * rest)};
+  return {seed, shape, size, size * rest, size * points, example_of<Kind>(size).at_rest(size * rest)};
 }
 
-template <Constraint Kind>
+template <ElementKind Kind>
 std::string trace(const Sample<Kind>& s) {
   return std::string(Kind::name) + ", seed " + std::to_string(s.seed) + ", size " + std::to_string(s.size) + " m";
 }
@@ -164,8 +179,8 @@ template <int N>
 Real net_torque(const Points<N>& points, const Gradient<N>& vectors) {
   Vector3 torque = Vector3::Zero();
   Real scale = 0;
-  for (int k = 0; k < N; ++k) {
-    torque += points.col(k).cross(vectors.col(k));
+  for (Eigen::Index k = 0; k < points.cols(); ++k) {
+    torque += Vector3(points.col(k)).cross(Vector3(vectors.col(k)));
     scale += points.col(k).norm() * vectors.col(k).norm();
   }
   return torque.norm() / scale;
@@ -173,15 +188,15 @@ Real net_torque(const Points<N>& points, const Gradient<N>& vectors) {
 
 /// Points that no kind has a regular gradient at: all in one place, on a line, in a plane.
 template <int N>
-std::vector<Points<N>> degenerate_points(Real size) {
-  Points<N> coincident, collinear, coplanar, all_but_one;
-  for (int k = 0; k < N; ++k) {
+std::vector<Points<N>> degenerate_points(int count, Real size) {
+  Points<N> coincident(3, count), collinear(3, count), coplanar(3, count), all_but_one(3, count);
+  for (int k = 0; k < count; ++k) {
     coincident.col(k) = Vector3(1, 2, 3);
     collinear.col(k) = k * Vector3(1, -1, 0.5);
     coplanar.col(k) = Vector3(k % 2, k / 2, 0);
     all_but_one.col(k) = k == 0 ? Vector3(1, 0, 0) : Vector3(0, 0, 0);
   }
-  return {size * coincident, size * collinear, size * coplanar, size * all_but_one, Points<N>::Zero()};
+  return {size * coincident, size * collinear, size * coplanar, size * all_but_one, 0 * coincident};
 }
 
 }  // namespace penalty::testing

@@ -2,8 +2,9 @@
 
 #include <limits>
 
-#include "kinds/dynamic_differences.h"
+#include "kinds/samples.h"
 #include "math/eigenvalues.h"
+#include "penalty/math/finite_difference.h"
 
 namespace penalty::testing {
 namespace {
@@ -135,11 +136,11 @@ TEST(ShapeMatch, GradientIsTheDerivativeOfTheEnergyWithoutNetForceAndTorque) {
       const Real energy = s.kind.energy_and_gradient(s.points, g);
       EXPECT_NEAR(energy, s.kind.energy(s.points), 1e-14 * (1 + energy));
       ASSERT_GT(g.norm() * s.size, 1e-3);
-      const auto differences =
-          differences_of_value([&](const auto& p) { return s.kind.energy(p); }, s.points, 1e-5 * s.size);
+      const auto differences = central_difference_gradient<dynamic>([&](const auto& p) { return s.kind.energy(p); },
+                                                                    s.points, 1e-5 * s.size);
       error.see(relative_error(differences, g), seed);
-      force.see(net_sum(g), seed);
-      torque.see(net_moment(s.points, g), seed);
+      force.see(net_force<dynamic>(g), seed);
+      torque.see(net_torque<dynamic>(s.points, g), seed);
     }
   EXPECT_GT(checked, 500);
   error.expect_below(1e-7, "gradient");
@@ -162,12 +163,30 @@ TEST(ShapeMatch, HessianIsTheDerivativeOfTheGradient) {
       };
       const Hessian<dynamic> h = s.kind.energy_hessian(s.points);
       ASSERT_GT(h.norm() * s.size * s.size, 0.1);
-      error.see(relative_error(differences_of_gradient(gradient, s.points, 1e-5 * s.size), h), seed);
+      error.see(relative_error(central_difference_hessian<dynamic>(gradient, s.points, 1e-5 * s.size), h), seed);
       asymmetry.see(relative_error(h.transpose(), h), seed);
     }
   EXPECT_GT(checked, 300);
   error.expect_below(1e-5, "hessian");
   asymmetry.expect_below(1e-14, "asymmetry");
+}
+
+TEST(ShapeMatch, DampingMatrixIsThatOfTheDampingForce) {
+  WorstError error;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const Sample s = sample(seed);
+    const Points<dynamic> v = Random(seed).vectors<dynamic>(s.points.cols(), 1);
+    Gradient<dynamic> product = Gradient<dynamic>::Zero(3, v.cols());
+    s.kind.visit_damping(
+        s.points, [&](int i, Real value) { product.col(i) += value * v.col(i); },
+        [&](Real coefficient, const Gradient<dynamic>& mode) {
+          product += coefficient * mode.cwiseProduct(v).sum() * mode;
+        });
+    const Gradient<dynamic> f = s.kind.damping_force(s.points, v, 0.7);
+    ASSERT_GT(f.norm(), 0);
+    error.see(relative_error(-0.7 * product, f), seed);
+  }
+  error.expect_below(1e-10, "damping matrix");
 }
 
 TEST(ShapeMatch, KeepsItsDigitsFarFromTheOrigin) {
@@ -179,10 +198,10 @@ TEST(ShapeMatch, KeepsItsDigitsFarFromTheOrigin) {
     const Points<dynamic> near = p.colwise() - p.col(0).eval();  // exact but for the rounding of p itself
     Gradient<dynamic> g(3, p.cols());
     energy.see(std::abs(s.kind.energy_and_gradient(p, g) - s.kind.energy(near)), seed);
-    force.see(net_sum(g), seed);
-    torque.see(net_moment(p, g), seed);
+    force.see(net_force<dynamic>(g), seed);
+    torque.see(net_torque<dynamic>(p, g), seed);
     const Gradient<dynamic> f = s.kind.damping_force(p, random.vectors<dynamic>(p.cols(), 1), 1);
-    damping.see(net_sum(f) + net_moment(p, f), seed);
+    damping.see(net_force<dynamic>(f) + net_torque<dynamic>(p, f), seed);
   }
   force.expect_below(1e-12, "net force");
   torque.expect_below(1e-12, "net torque");
@@ -396,8 +415,8 @@ TEST(ShapeMatch, DampingForceDissipatesWithoutNetForceAndTorque) {
       const Gradient<dynamic> f = s.kind.damping_force(p, v, 2);
       ASSERT_GT(f.norm(), 0);
       EXPECT_LT(f.cwiseProduct(v).sum(), 0);
-      force.see(net_sum(f), seed);
-      torque.see(net_moment(p, f), seed);
+      force.see(net_force<dynamic>(f), seed);
+      torque.see(net_torque<dynamic>(p, f), seed);
       Points<dynamic> turning = p / s.size;
       const Vector3 spin = random.vector(1), drift = random.vector(1);
       for (Eigen::Index i = 0; i < p.cols(); ++i) turning.col(i) = drift + spin.cross(Vector3(p.col(i))) / s.size;
@@ -419,9 +438,7 @@ TEST(ShapeMatch, RefusesBadGroupsAndSaysWhy) {
   Points<dynamic> bad = cube();
   bad(0, 5) = std::numeric_limits<Real>::infinity();
   EXPECT_NE(refusal(ShapeMatch(), bad).find("nan"), std::string::npos);
-  EXPECT_EQ(complaint<std::invalid_argument>([] {
-              ShapeMatch({1, 0, 1});
-            }),
+  EXPECT_EQ(complaint<std::invalid_argument>([] { ShapeMatch({1, 0, 1}); }),
             "shape match: weight 1 is 0, must be positive and finite");
 }
 

@@ -246,7 +246,7 @@ TEST(StableNeoHookean, AnInvertedElementIsPulledBackThroughFlat) {
 TEST(StableNeoHookean, DegenerateStencilsAreFinite) {
   for (unsigned seed = 0; seed < 25; ++seed) {
     const auto [s, kind] = element(seed);
-    for (const Points<4>& points : degenerate_points<4>(s.size)) {
+    for (const Points<4>& points : degenerate_points<4>(4, s.size)) {
       Gradient<4> gradient;
       EXPECT_TRUE(std::isfinite(kind.energy_and_gradient(points, gradient))) << points;
       EXPECT_TRUE(gradient.allFinite()) << points;

@@ -106,9 +106,7 @@ TEST(TetrahedronVolume, OnlyCollinearPointsHaveNoGradient) {
 }
 
 TEST(TetrahedronVolume, RefusesFlatRestShapesByName) {
-  EXPECT_EQ(complaint<std::invalid_argument>([] {
-              TetrahedronVolume::at_rest(corner({1, 1, 0}));
-            }),
+  EXPECT_EQ(complaint<std::invalid_argument>([] { TetrahedronVolume::at_rest(corner({1, 1, 0})); }),
             "tetrahedron volume: rest volume is 0");
 }
 

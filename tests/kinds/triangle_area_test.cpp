@@ -101,14 +101,11 @@ TEST(TriangleArea, CoincidentPointsHaveNoGradient) {
 }
 
 TEST(TriangleArea, RefusesLinesByName) {
-  EXPECT_EQ(complaint<std::invalid_argument>([] {
-              TriangleArea::at_rest(triangle({0, 0, 0}, {1, 0, 0}, {2, 0, 0}));
-            }),
+  EXPECT_EQ(complaint<std::invalid_argument>([] { TriangleArea::at_rest(triangle({0, 0, 0}, {1, 0, 0}, {2, 0, 0})); }),
             "triangle area: rest area is 0");
-  EXPECT_EQ(complaint<std::invalid_argument>([] {
-              TriangleArea::at_rest(triangle({0, 0, 0}, {1, 0, 0}, {2, 2e-9, 0}));
-            }),
-            "triangle area: rest area is 1e-09, next to nothing for its edges");
+  EXPECT_EQ(
+      complaint<std::invalid_argument>([] { TriangleArea::at_rest(triangle({0, 0, 0}, {1, 0, 0}, {2, 2e-9, 0})); }),
+      "triangle area: rest area is 1e-09, next to nothing for its edges");
 }
 
 }  // namespace

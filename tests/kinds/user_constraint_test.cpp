@@ -3,10 +3,11 @@
 #include <limits>
 #include <vector>
 
-#include "kinds/dynamic_differences.h"
+#include "kinds/samples.h"
 #include "penalty/kinds/enclosed_volume.h"
 #include "penalty/kinds/length.h"
 #include "penalty/kinds/tetrahedron_volume.h"
+#include "penalty/math/finite_difference.h"
 
 namespace penalty::testing {
 namespace {

@@ -78,8 +78,8 @@ TEST(Unfold, LeadsOutOfEveryFlatStateWithoutTurningAnElementInsideOut) {
       PackedVectors x = pack((rotation * kept.asDiagonal() * rest.topRows<3>()).colwise() + shift);
       EXPECT_TRUE(unfold(x, rest, span, inverse_masses));
       EXPECT_EQ(affine_span(x, span.spreads[0]).dimension, 3);
-      // The affine map from rest, by least squares: it keeps the orientation. The rotation that fits best is not quite that of
-      // the flat state, unless the points spread evenly, so the volume is not exactly that of the two added up.
+      // The affine map from rest, by least squares: it keeps the orientation. The rotation that fits best is not quite
+      // that of the flat state, unless the points spread evenly, so the volume is not exactly that of the two added up.
       const Eigen::Matrix3Xd from = rest.topRows<3>().colwise() - rest.topRows<3>().rowwise().mean();
       const Eigen::Matrix3Xd to = x.topRows<3>().colwise() - x.topRows<3>().rowwise().mean();
       const Matrix3 map = to * from.transpose() * (from * from.transpose()).inverse();

@@ -139,25 +139,15 @@ TEST(MakeTorus, VolumeConvergesToTheClosedForm) {
 
 TEST(Builders, NameTheArgumentTheyRefuse) {
   const Real nan = std::numeric_limits<Real>::quiet_NaN(), infinity = std::numeric_limits<Real>::infinity();
-  EXPECT_EQ(invalid_argument([&] {
-              make_box({1, -1, 1}, {1, 1, 1});
-            }),
+  EXPECT_EQ(invalid_argument([&] { make_box({1, -1, 1}, {1, 1, 1}); }),
             "make_box: size.y is -1, not a positive finite length");
-  EXPECT_EQ(invalid_argument([&] {
-              make_box({nan, 1, 1}, {1, 1, 1});
-            }),
+  EXPECT_EQ(invalid_argument([&] { make_box({nan, 1, 1}, {1, 1, 1}); }),
             "make_box: size.x is nan, not a positive finite length");
-  EXPECT_EQ(invalid_argument([&] {
-              make_box({1, 1, 1}, {1, 1, 0});
-            }),
+  EXPECT_EQ(invalid_argument([&] { make_box({1, 1, 1}, {1, 1, 0}); }),
             "make_box: cells.z is 0, not between 1 and 100000000");
-  EXPECT_EQ(invalid_argument([&] {
-              make_box({1, 1, 1}, {100000, 100000, 1});
-            }),
+  EXPECT_EQ(invalid_argument([&] { make_box({1, 1, 1}, {100000, 100000, 1}); }),
             "make_box: cells are more than 100000000 together");
-  EXPECT_EQ(invalid_argument([&] {
-              make_box({1, 1, 1e-9}, {1, 1, 1});
-            }).substr(0, 40),
+  EXPECT_EQ(invalid_argument([&] { make_box({1, 1, 1e-9}, {1, 1, 1}); }).substr(0, 40),
             "make_box(1, 1, 1e-09, 1, 1, 1): tetrahed");
   EXPECT_EQ(invalid_argument([&] { make_beam(0); }), "make_beam: cells_across is 0, not between 1 and 200");
   EXPECT_EQ(invalid_argument([&] { make_ball(0, 1); }), "make_ball: radius is 0, not a positive finite length");

@@ -54,9 +54,7 @@ TEST(Repair, NamesWhatItRefuses) {
   EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[0][3] = -1; }),
             "made: tetrahedron 0: vertex index -1 is outside 0 to 4");
   EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[0][3] = 2; }), "made: tetrahedron 0: vertex 2 is used twice");
-  EXPECT_EQ(complaint([](TetMesh& m) {
-              m.tetrahedra[1] = {3, 0, 1, 2};
-            }),
+  EXPECT_EQ(complaint([](TetMesh& m) { m.tetrahedra[1] = {3, 0, 1, 2}; }),
             "made: tetrahedron 1: same four vertices as tetrahedron 0");
   EXPECT_EQ(complaint([](TetMesh& m) { m.vertices.col(4) << 2, 2, 0; }),
             "made: tetrahedron 1: flat: volume 0 at a longest edge of 2.82843");

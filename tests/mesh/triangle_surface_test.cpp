@@ -83,9 +83,7 @@ TEST(RepairSurface, NamesWhatItRefuses) {
   EXPECT_EQ(complaint([](TriangleSurface& s) { s.triangles[3][1] = 27; }),
             "cube: triangle 3: vertex index 27 is outside 0 to 26");
   EXPECT_EQ(
-      complaint([](TriangleSurface& s) {
-        s.triangles = {{0, 1, 3}};
-      }),
+      complaint([](TriangleSurface& s) { s.triangles = {{0, 1, 3}}; }),
       "cube: the surface is open: the edge from vertex (0, 0, 0) to vertex (0, 0, 0.5) belongs to one triangle only");
   EXPECT_NE(
       complaint([](TriangleSurface& s) { s.triangles.pop_back(); }).find("cube: the surface is open: the edge from"),
@@ -96,9 +94,7 @@ TEST(RepairSurface, NamesWhatItRefuses) {
               std::swap(s.triangles[7][0], s.triangles[7][1]);
             }).find("cube: neighbouring triangles face opposite sides: both run through the edge from vertex ("),
             std::string::npos);
-  EXPECT_EQ(complaint([](TriangleSurface& s) {
-              s.triangles = {{0, 1, 3}, {0, 3, 1}};
-            }),
+  EXPECT_EQ(complaint([](TriangleSurface& s) { s.triangles = {{0, 1, 3}, {0, 3, 1}}; }),
             "cube: the surface encloses a volume of 0");
   TriangleSurface surface = cube();
   EXPECT_EQ(invalid_argument([&] { repair(surface, -1); }), "repair: merge_tolerance is -1, not between 0 and 1");

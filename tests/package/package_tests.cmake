@@ -54,21 +54,6 @@ foreach(precision float float64)
   endif()
 endforeach()
 
-# Every program is linked from these; those of one precision of Bullet only, as no program has both.
-foreach(suffix "" "-float64")
-  if(TARGET bullet_penalty${suffix})
-    set(penalty_libraries "")
-    foreach(target penalty_core penalty_mesh penalty_surface bullet_penalty${suffix} penalty_render penalty_scene_setups
-                   penalty_scenes${suffix} penalty_program penalty_demo_program penalty_study_program)
-      if(TARGET ${target})
-        list(APPEND penalty_libraries $<TARGET_FILE:${target}>)
-      endif()
-    endforeach()
-    add_test(NAME package.symbols${suffix}
-             COMMAND bash ${PROJECT_SOURCE_DIR}/tests/package/symbols.sh ${penalty_libraries})
-  endif()
-endforeach()
-
 # What applications include leaves the insides of the solver alone: they cost each of their sources time to compile.
 if(TARGET bullet_penalty)
   add_test(NAME package.headers COMMAND ${CMAKE_COMMAND} -D COMPILER=${CMAKE_CXX_COMPILER}

@@ -1,16 +1,18 @@
 // advance() allocates in its first step only: every allocation of this program is counted.
 #include "math/allocations.h"
+#include "penalty/fields/batch_loops.h"
+#include "penalty/kinds/user_constraint.h"
 #include "stepping/islands.h"
 
 namespace penalty::testing {
 namespace {
 
 // Allocations of a second, third .. step.
-long allocations(Body& body, std::span<RigidBody> rigid_bodies = {}) {
-  SteppedBody* bodies[] = {&body.body};
-  penalty::advance(bodies, rigid_bodies, 1.0 / 60);
+long allocations(Body& body, std::vector<RigidBody> rigid_bodies = {}) {
+  Island island{.bodies = {&body.body}, .rigid_bodies = std::move(rigid_bodies), .contacts = body.contacts};
+  penalty::advance(island, 1.0 / 60);
   const long before = num_allocations;
-  for (int step = 0; step < 5; ++step) penalty::advance(bodies, rigid_bodies, 1.0 / 60);
+  for (int step = 0; step < 5; ++step) penalty::advance(island, 1.0 / 60);
   return num_allocations - before;
 }
 
@@ -50,11 +52,11 @@ TEST(Allocation, AnImplicitStepNeedsNone) {
 TEST(Allocation, ARetriedStepNeedsNone) {
   Body beam = make_beam_body(1);
   beam.particles().positions.row(0) *= 4;
-  SteppedBody* bodies[] = {&beam.body};
-  penalty::advance(bodies, {}, 1e-9);
+  Island island{.bodies = {&beam.body}};
+  penalty::advance(island, 1e-9);
   beam.body.last_substeps = 0;
   const long before = num_allocations;
-  penalty::advance(bodies, {}, 1.0 / 60);
+  penalty::advance(island, 1.0 / 60);
   EXPECT_GT(beam.body.report.retries, 0);
   EXPECT_EQ(num_allocations, before);
 }
@@ -62,8 +64,32 @@ TEST(Allocation, ARetriedStepNeedsNone) {
 TEST(Allocation, ContactWithRigidBodiesNeedsNone) {
   Body beam = make_beam_body(1);
   RigidBody rigid = make_sphere(10, 1, {0, -1, 0});
-  beam.body.contacts.push_back({ContactPoint::at_particle(0), 0, {0, 1, 0}, {0, 1, 0}, 0.5});
-  EXPECT_EQ(allocations(beam, std::span(&rigid, 1)), 0);
+  beam.touch(WeightedPoint::at_particle(0), 0, {0, 1, 0}, {0, 1, 0}, 0.5);
+  EXPECT_EQ(allocations(beam, {rigid}), 0);
+}
+
+TEST(Allocation, PlasticFlowAndPhasesNeedNone) {
+  const TetMesh mesh = make_box({1, 1, 1}, {3, 3, 3});
+  PotentialField field =
+      make_recovering_field(mesh.vertices, mesh.tetrahedra, {.young = 1e4}, ElasticModel::springs_volumes);
+  field.batch<Length>().set_plasticity({.yield = 0.5});
+  const auto count = static_cast<std::size_t>(mesh.vertices.cols());
+  Body cube = make_body(std::move(field), std::vector<Real>(count, 64));
+  EXPECT_EQ(allocations(cube), 0);
+}
+
+TEST(Allocation, AnImplicitStepOfElementsOfManyPointsNeedsNone) {
+  const TetMesh mesh = make_box({1, 1, 1}, {2, 2, 2});
+  PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 1e4});
+  std::vector<std::vector<int>> everyone(1);
+  for (int i = 0; i < mesh.vertices.cols(); ++i) everyone[0].push_back(i);
+  const auto constraint = difference_constraint<dynamic>(
+      [](const Points<dynamic>& p) -> Real { return p.row(0).squaredNorm(); }, RestValue::relative);
+  field.add(constraint, everyone, 10);
+  Body cube = make_body(std::move(field), std::vector<Real>(27, 27));
+  cube.body.options.integrator = Integrator::implicit_step;
+  cube.particles().positions.row(0) *= 1.1;
+  EXPECT_EQ(allocations(cube), 0);
 }
 
 }  // namespace

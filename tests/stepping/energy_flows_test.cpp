@@ -8,11 +8,11 @@ namespace {
 class Balance {
  public:
   explicit Balance(const Body& body)
-      : start_(body.body.potential->energy(body.particles().positions) + kinetic_energy(body.particles())) {
+      : start_(body.body.field->energy(body.particles().positions) + kinetic_energy(body.particles())) {
     see_energy(start_);
   }
   void see(const Body& body) {
-    const Real energy = body.body.potential->energy(body.particles().positions) + kinetic_energy(body.particles());
+    const Real energy = body.body.field->energy(body.particles().positions) + kinetic_energy(body.particles());
     see_energy(energy);
     const EnergyFlows& flows = body.body.flows;
     see_energy(std::abs(flows.received()));
@@ -45,15 +45,9 @@ TEST(EnergyFlows, BalanceInADampedDropOnTheGround) {
   ground.position = {0, -1, 0};
   Balance balance(body);
   for (int step = 0; step < 120; ++step) {
-    body.body.contacts.clear();
-    for (int i = 0; i < body.particles().size(); ++i) {
-      Contact contact;
-      contact.point = ContactPoint::at_particle(i);
-      contact.normal = Vector3::UnitY();
-      contact.anchor = Vector3::Zero();
-      contact.friction = 0.5;
-      body.body.contacts.push_back(contact);
-    }
+    body.contacts.clear();
+    for (int i = 0; i < body.particles().size(); ++i)
+      body.touch(WeightedPoint::at_particle(i), 0, {0, 0, 0}, {0, 1, 0}, 0.5);
     RigidBody bodies[] = {ground};
     advance(body, 1.0 / 60, bodies);
     balance.see(body);
@@ -99,7 +93,7 @@ TEST(EnergyFlows, ABodyThatHangsAtRestReceivesNothing) {
   // A light node carries a heavy one; with damping there are several blocks in a step, whose kicks come in halves.
   Body chain = make_chain(2, 400, [](ElementBatch& springs) { springs.set_damping_time(0.002); });
   chain.particles().inverse_masses[1] = 50;
-  estimate_stability(chain.body, chain.field->rest_positions());
+  estimate_stability(chain.body);
   chain.body.gravity = {9.81, 0, 0};
   for (int step = 0; step < 6000; ++step) advance(chain, 1.0 / 60);
   const EnergyFlows before = chain.body.flows;
@@ -129,8 +123,7 @@ TEST(EnergyFlows, BalanceWhileSpringsBreak) {
   EXPECT_NEAR(chain.body.flows.inelastic, energy, 1e-9 * energy);
   EXPECT_LT(balance.relative(), 0.01);
   // Nothing is lost or counted twice: what broke and what holds are all there are.
-  std::vector<LedgerEntry> ledger;
-  chain.field->append_ledger(chain.particles().positions, ledger);
+  const std::vector<LedgerEntry> ledger = penalty::ledger(*chain.field, chain.particles().positions);
   EXPECT_EQ(ledger[0].num_enabled + breaks.size(), ledger[0].num_elements);
 }
 
@@ -148,8 +141,8 @@ TEST(EnergyFlows, BalanceInPlasticFlowAndTheDentIsTheYieldLaws) {
   const Batch<Length>& spring = *chain.field->find<Length>();
   EXPECT_NEAR(spring.plastic_strain(0), 0.4, 1e-12);
   EXPECT_NEAR(chain.body.elastic_energy, 100 * 0.1 * 0.1 / 2, 1e-9);
-  // K s ds: up to the yield strain it is stored, from there on all work is lost. The spring flows eight times a step, so that
-  // between two flows its strain overshoots the yield strain, by half a block in the mean.
+  // K s ds: up to the yield strain it is stored, from there on all work is lost. The spring flows eight times a step,
+  // so that between two flows its strain overshoots the yield strain, by half a block in the mean.
   const Real overshoot = 0.5 / (60 * 8) / 2;
   EXPECT_NEAR(chain.body.flows.driving, 0.5 + 100 * (0.1 + overshoot) * 0.4, 1e-9);
   EXPECT_NEAR(chain.body.flows.inelastic, 100 * (0.1 + overshoot) * 0.4, 1e-9);

@@ -9,13 +9,18 @@ Vector3 Body::velocity(int i) const { return body.particles.velocities.col(i).he
 void Body::set_position(int i, const Vector3& x) { body.particles.positions.col(i).head<3>() = x; }
 void Body::set_velocity(int i, const Vector3& v) { body.particles.velocities.col(i).head<3>() = v; }
 
+void Body::touch(const WeightedPoint& point, int rigid, const Vector3& anchor, const Vector3& normal, Real friction) {
+  contacts.push_back(
+      {.a = Side::of_particles(0, point), .b = Side::of_rigid(rigid, anchor), .normal = normal, .friction = friction});
+}
+
 Body make_body(PotentialField field, std::vector<Real> inverse_masses) {
   Body result;
   result.field = std::make_unique<PotentialField>(std::move(field));
   const PackedVectors& rest = result.field->rest_positions();
   result.body.particles = {rest, PackedVectors::Zero(4, rest.cols()), std::move(inverse_masses)};
-  result.body.potential = result.field.get();
-  estimate_stability(result.body, rest);
+  result.body.field = result.field.get();
+  estimate_stability(result.body);
   return result;
 }
 
@@ -31,9 +36,25 @@ Body make_free_particles(const Eigen::Matrix3Xd& positions, std::vector<Real> ma
   return make_body(PotentialField(positions), std::move(masses));
 }
 
+void advance(const std::vector<Body*>& bodies, Real duration, std::span<RigidBody> rigid_bodies,
+             const std::vector<Coupling*>& couplings) {
+  Island island;
+  island.rigid_bodies.assign(rigid_bodies.begin(), rigid_bodies.end());
+  island.couplings = couplings;
+  for (Body* body : bodies) {
+    for (Contact contact : body->contacts) {
+      contact.a.body = static_cast<int>(island.bodies.size());
+      island.contacts.push_back(contact);
+    }
+    island.bodies.push_back(&body->body);
+  }
+  for (Coupling* coupling : couplings) estimate_stability(*coupling, island, false);
+  penalty::advance(island, duration);
+  std::copy(island.rigid_bodies.begin(), island.rigid_bodies.end(), rigid_bodies.begin());
+}
+
 void advance(Body& body, Real duration, std::span<RigidBody> rigid_bodies) {
-  SteppedBody* bodies[] = {&body.body};
-  penalty::advance(bodies, rigid_bodies, duration);
+  advance(std::vector<Body*>{&body}, duration, rigid_bodies);
 }
 
 RigidBody make_sphere(Real mass, Real radius, const Vector3& position) {

@@ -1,16 +1,17 @@
-// Bodies to step, and the momenta of everything in an island.
+// Bodies to step, islands of them, and the momenta of everything in an island.
 #pragma once
 #include <memory>
 
 #include "fields/meshes.h"
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty::testing {
 
-/// A stepped body together with the field that it needs.
+/// A stepped body together with the field that it needs, and the contacts of its next step.
 struct Body {
   std::unique_ptr<PotentialField> field;
   SteppedBody body;
+  std::vector<Contact> contacts = {};  // whose sides a are numbered by `advance`
 
   Particles& particles() { return body.particles; }
   const Particles& particles() const { return body.particles; }
@@ -19,6 +20,9 @@ struct Body {
   void set_position(int i, const Vector3& x);
   void set_velocity(int i, const Vector3& v);
   Real energy() const { return body.elastic_energy + kinetic_energy(body.particles); }
+
+  /// A contact of `point` with the plane through `anchor` of rigid body number `rigid`.
+  void touch(const WeightedPoint& point, int rigid, const Vector3& anchor, const Vector3& normal, Real friction = 0);
 };
 
 Body make_body(PotentialField field, std::vector<Real> inverse_masses);
@@ -29,6 +33,9 @@ Body make_beam_body(int cells_across, const Material& material = {.young = 1e6, 
 /// Particles without forces between them.
 Body make_free_particles(const Eigen::Matrix3Xd& positions, std::vector<Real> masses);
 
+/// Steps bodies with their contacts, the rigid bodies that these are with, and couplings, as one island.
+void advance(const std::vector<Body*>& bodies, Real duration, std::span<RigidBody> rigid_bodies = {},
+             const std::vector<Coupling*>& couplings = {});
 void advance(Body& body, Real duration, std::span<RigidBody> rigid_bodies = {});
 
 /// A uniform solid sphere.

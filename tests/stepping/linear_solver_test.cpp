@@ -12,8 +12,7 @@ struct Problem {
   PackedVectors x, b;
   LinearSystem system;
 
-  explicit Problem(unsigned seed, const std::array<int, 3>& cells = {3, 2, 2}, Real inertia = 1e-3)
-      : system{BlockMatrix(0, {}), {}, {}} {
+  explicit Problem(unsigned seed, const std::array<int, 3>& cells = {3, 2, 2}, Real inertia = 1e-3) {
     Random random(seed);
     const TetMesh mesh = noisy_box(cells, 0.5, 0.1, random);
     const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 100});
@@ -25,19 +24,13 @@ struct Problem {
 
   void add_term(unsigned seed, Real coefficient) {
     Random random(seed);
-    RankOneTerm term{coefficient, {}, random.vectors<Eigen::Dynamic>(x.cols(), 1)};
-    for (int i = 0; i < x.cols(); ++i) term.particles.push_back(i);
-    system.terms.push_back(std::move(term));
+    std::vector<int> everyone;
+    for (int i = 0; i < x.cols(); ++i) everyone.push_back(i);
+    system.matrix.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(x.cols(), 1));
   }
 
   Eigen::MatrixXd dense() const {
     Eigen::MatrixXd a = system.matrix.to_dense();
-    for (const RankOneTerm& term : system.terms) {
-      Eigen::VectorXd d = Eigen::VectorXd::Zero(a.rows());
-      for (std::size_t k = 0; k < term.particles.size(); ++k)
-        d.segment<3>(3 * term.particles[k]) = term.direction.col(static_cast<Eigen::Index>(k));
-      a += term.coefficient * d * d.transpose();
-    }
     for (const int i : system.fixed) {
       a.middleRows<3>(3 * i).setZero();
       a.middleCols<3>(3 * i).setZero();
@@ -55,7 +48,7 @@ struct Problem {
 
   PackedVectors solved(int* iterations = nullptr, const LinearOptions& options = {2000, 1e-12}) const {
     LinearSolver solver;
-    solver.set_pattern(system.matrix);
+    solver.set_pattern(system.matrix.blocks());
     solver.factorize(system, x);
     PackedVectors y(4, x.cols());
     const int used = solver.solve(system, b, options, y).iterations;
@@ -93,15 +86,15 @@ TEST(LinearSolver, LeadsDownhillHoweverEarlyItStops) {
 }
 
 TEST(LinearSolver, CoarseSpaceKeepsTheIterationsOfALongBarFew) {
-  // A bar four, then sixteen times as long as wide, nearly without inertia: block Jacobi alone needs more iterations the longer
-  // it is. Groups of 40 that move as rigid bodies carry the smooth part.
+  // A bar four, then sixteen times as long as wide, nearly without inertia: block Jacobi alone needs more iterations
+  // the longer it is. Groups of 40 that move as rigid bodies carry the smooth part.
   const auto without_coarse_space = [](const Problem& problem) {
     // The same recurrence with the block diagonal alone.
     const LinearSystem& a = problem.system;
     PackedVectors r = problem.b, z = r, q(4, r.cols());
     const auto precondition = [&] {
       for (int i = 0; i < r.cols(); ++i)
-        z.col(i).head<3>() = a.matrix.diagonal(i).ldlt().solve(Vector3(r.col(i).head<3>()));
+        z.col(i).head<3>() = a.matrix.blocks().diagonal(i).ldlt().solve(Vector3(r.col(i).head<3>()));
     };
     precondition();
     PackedVectors p = z;

@@ -79,8 +79,7 @@ TEST(NotFinite, OneBodyUndoesTheWholeIsland) {
   good.set_velocity(0, {1, 0, 0});
   bad.set_velocity(5, {std::nan(""), 0, 0});
   const PackedVectors x = good.particles().positions;
-  SteppedBody* both[] = {&good.body, &bad.body};
-  penalty::advance(both, {}, 1.0 / 60);
+  advance({&good, &bad}, 1.0 / 60);
   EXPECT_FALSE(good.body.report.finite);
   EXPECT_FALSE(bad.body.report.finite);
   EXPECT_EQ(good.body.report.first_bad_particle, -1);  // it is not this one's fault

@@ -55,8 +55,7 @@ TEST(StepOptions, SubstepsAreTakenAsAskedAndNeverBeyondTheMost) {
 TEST(StepOptions, OfTheStiffestBodyCountForTheIsland) {
   Body soft = make_beam_body(1), stiff = make_beam_body(1, {.young = 1e8, .poisson = 0.4});
   Body alone = make_beam_body(1, {.young = 1e8, .poisson = 0.4});
-  SteppedBody* both[] = {&soft.body, &stiff.body};
-  penalty::advance(both, {}, 1.0 / 60);
+  advance({&soft, &stiff}, 1.0 / 60);
   advance(alone, 1.0 / 60);
   EXPECT_GT(alone.body.report.substeps, 10);
   EXPECT_EQ(soft.body.report.substeps, alone.body.report.substeps);

@@ -62,12 +62,16 @@ TEST(StudyResult, ComesBackFromItsLine) {
 TEST(ResultFile, KeepsWhatIsThereAndTakesOffHalfALine) {
   const TemporaryDirectory directory;
   const auto path = directory / "results-2-of-3.jsonl";
-  { ResultFile(directory.path(), 2, 3).append(result_of(1)); }
+  {
+    ResultFile(directory.path(), 2, 3).append(result_of(1));
+  }
   const std::string one = contents(path);
   EXPECT_EQ(one, to_line(result_of(1)) + "\n");
   std::ofstream(path, std::ios::app) << to_line(result_of(2)).substr(0, 50);
   EXPECT_EQ(read_results({directory.path()}).size(), 1u) << "a half line is no result yet";
-  { ResultFile(directory.path(), 2, 3).append(result_of(3)); }
+  {
+    ResultFile(directory.path(), 2, 3).append(result_of(3));
+  }
   EXPECT_EQ(contents(path), one + to_line(result_of(3)) + "\n");
   EXPECT_EQ(read_results({directory.path()}).size(), 2u);
 }
@@ -96,9 +100,7 @@ TEST(Merged, HasEachCaseOnceAndRefusesContradictions) {
   slower.cpu_seconds_to_recover = 8;
   EXPECT_EQ(merged({result_of(1), result_of(2), slower}).size(), 2u);
   slower.positions_hash.back() = '0';
-  EXPECT_EQ(message_of([&] {
-              merged({result_of(1), result_of(2), slower});
-            }),
+  EXPECT_EQ(message_of([&] { merged({result_of(1), result_of(2), slower}); }),
             "two results of world/classic float32 20 s/recovering/box4/scramble/1 contradict each other");
 }
 

@@ -10,23 +10,9 @@
 namespace penalty {
 namespace {
 
-void check_contact_points(const std::vector<ContactPoint>& points, int num_particles) {
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const auto fail = [&](const std::string& what) {
-      throw std::invalid_argument("attach: contact point " + std::to_string(k) + ": " + what);
-    };
-    const ContactPoint& point = points[k];
-    if (point.num_particles < 1 || point.num_particles > 4)
-      fail("has " + std::to_string(point.num_particles) + " particles, must have 1 to 4");
-    Real sum = 0;
-    for (int i = 0; i < point.num_particles; ++i) {
-      if (point.particles[i] < 0 || point.particles[i] >= num_particles)
-        fail("index " + std::to_string(point.particles[i]) + " is outside the " + std::to_string(num_particles) +
-             " nodes");
-      sum += point.weights[i];
-    }
-    if (!(std::abs(sum - 1) < 1e-6)) fail("weights sum to " + to_text(sum) + ", must sum to 1");
-  }
+void check_contact_points(const std::vector<WeightedPoint>& points, int num_particles) {
+  for (std::size_t k = 0; k < points.size(); ++k)
+    points[k].check(num_particles, "attach: contact point " + std::to_string(k));
 }
 
 }  // namespace
@@ -50,7 +36,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
   HeldBodies& bodies = *attached_->bodies;
   HeldBody* held = bodies.find(body);
   if (held) {
-    held->field.add(std::make_unique<PotentialField>(std::move(field)));
+    held->field.add(std::move(field));
     held->options = options;
     held->stepped.options = options.step;
     held->stale = true;
@@ -78,9 +64,7 @@ const EnergyFlows& AttachedBodies::flows(const btSoftBody& body) const {
   return attached_->bodies->get(body).stepped.flows;
 }
 std::vector<LedgerEntry> AttachedBodies::ledger(const btSoftBody& body) const {
-  std::vector<LedgerEntry> entries;
-  field(body).append_ledger(particles(body).positions, entries);
-  return entries;
+  return penalty::ledger(field(body), particles(body).positions);
 }
 PackedVectors AttachedBodies::forces(const btSoftBody& body) const {
   PackedVectors forces = PackedVectors::Zero(4, particles(body).size());

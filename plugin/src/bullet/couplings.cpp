@@ -53,16 +53,14 @@ void check_points(const HeldBodies& bodies, const std::vector<CouplingPoint>& po
       any_soft = true;
       const HeldBody* held = bodies.find(*point.soft_body);
       if (!held) fail("its soft body is not attached");
-      if (point.node < 0 || point.node >= held->stepped.particles.size())
-        fail("node " + std::to_string(point.node) + " is outside the " +
-             std::to_string(held->stepped.particles.size()) + " of its body");
+      point.point.check(held->stepped.particles.size(), "couple: point " + std::to_string(k));
     } else {
       if (!point.rigid_body->getBroadphaseHandle()) fail("its rigid body is in no world");
       if (!point.anchor.allFinite()) fail("its anchor is not finite");
     }
     for (std::size_t l = 0; l < k; ++l)
-      if (point.soft_body && points[l].soft_body == point.soft_body && points[l].node == point.node)
-        fail("node " + std::to_string(point.node) + " is point " + std::to_string(l) + " already");
+      if (point.soft_body && points[l].soft_body == point.soft_body && points[l].point == point.point)
+        fail("is the same as point " + std::to_string(l));
   }
   if (!any_soft)
     throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
@@ -96,7 +94,7 @@ int Couplings::add(const HeldBodies& bodies, const std::vector<CouplingPoint>& p
   }
   auto coupling = std::make_unique<HeldCoupling>(
       HeldCoupling{.number = next_number_, .points = std::move(held_points), .field = std::move(field)});
-  coupling->stepped.potential = &coupling->field;
+  coupling->stepped.field = &coupling->field;
   coupling->stepped.damping_time = damping_time;
   coupling->stepped.points.resize(points.size());
   couplings_.push_back(std::move(coupling));

@@ -1,4 +1,5 @@
-// Couplings of the attached bodies: made and taken away, followed through bodies that come and go, brought into the step.
+// Couplings of the attached bodies: made and taken away, followed through bodies that come and go, brought into the
+// step.
 #pragma once
 #include <memory>
 #include <span>
@@ -6,6 +7,7 @@
 
 #include "identity.h"
 #include "penalty/bullet/attached_bodies.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty {
 
@@ -46,7 +48,8 @@ class Couplings {
   /// Its bodies wake in the next step: until then nobody knows whether they are alive.
   void wake(const HeldCoupling& coupling);
 
-  /// Begins a step: finds the bodies in the world, wakes who is to be woken, drops in silence what holds a body that is gone.
+  /// Begins a step: finds the bodies in the world, wakes who is to be woken, drops in silence what holds a body that is
+  /// gone.
   void find_bodies(const HeldBodies& bodies, std::span<btSoftBody* const> listed);
 
   /// Holds the bodies of couplings whose rigid body has left the world.
@@ -55,8 +58,8 @@ class Couplings {
   /// A body that is held holds those that it is coupled to.
   void hold_coupled();
 
-  /// Brings the bodies of each coupling that is awake into one island. A coupling to a soft body that rests, or is not in the world,
-  /// rests.
+  /// Brings the bodies of each coupling that is awake into one island. A coupling to a soft body that rests, or is not
+  /// in the world, rests.
   void join(std::vector<WorldIsland>& islands, const class RigidBodies& rigid_bodies) const;
 
   std::span<const std::unique_ptr<HeldCoupling>> all() const { return couplings_; }

@@ -29,10 +29,33 @@ struct DeformablePenaltyForce::Attached {
   PotentialField field;
   std::string problem;
   PackedVectors positions, in, out;  // scratch, one column a node
+  System matrix;                     // scratch, of the elements that there were when it was made
+  std::size_t num_elements = 0;
 
   Attached(btSoftBody& soft_body, PotentialField potential_field)
       : body(&soft_body), name(Identity::of(soft_body)), field(std::move(potential_field)) {
     positions = in = out = PackedVectors::Zero(4, field.num_particles());
+  }
+
+  const System& stiffness() {
+    clear_matrix();
+    field.add_stiffness(positions, StiffnessModel::gauss_newton, matrix);
+    return matrix;
+  }
+  const System& damping(Real time) {
+    clear_matrix();
+    field.add_damping(positions, time, matrix);
+    return matrix;
+  }
+  void clear_matrix() {
+    if (num_elements != field.num_elements()) {
+      matrix = System::with_pattern(field.num_particles(), [this](System& system) {
+        field.add_stiffness(field.rest_positions(), StiffnessModel::gauss_newton, system);
+        field.add_damping(field.rest_positions(), 1, system);
+      });
+      num_elements = field.num_elements();
+    }
+    matrix.set_zero();
   }
 
   void set_problem(const char* what) noexcept {
@@ -71,7 +94,7 @@ void DeformablePenaltyForce::attach(btSoftBody& body, PotentialField field) {
     throw std::invalid_argument("attach: the field has " + std::to_string(field.num_particles()) +
                                 " particles, the soft body " + std::to_string(body.m_nodes.size()) + " nodes");
   if (Attached* attached = find(body)) {
-    attached->field.add(std::make_unique<PotentialField>(std::move(field)));
+    attached->field.add(std::move(field));
     return;
   }
   detach(body);  // whoever was at this address
@@ -131,7 +154,7 @@ void DeformablePenaltyForce::addScaledDampingForce(btScalar scale, TVStack& forc
   for_each_active([&](Attached& a) {
     if (damping_time_ == 0 && !a.field.damps()) return;
     a.read_velocities();
-    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    a.damping(damping_time_).add_product(a.in, -1, a.out);
     a.add_to(force, scale);
   });
 }
@@ -139,7 +162,7 @@ void DeformablePenaltyForce::addScaledDampingForce(btScalar scale, TVStack& forc
 void DeformablePenaltyForce::addScaledElasticForceDifferential(btScalar scale, const TVStack& dx, TVStack& df) {
   for_each_active([&](Attached& a) {
     a.read(dx);
-    a.field.add_stiffness_product(a.positions, StiffnessModel::gauss_newton, a.in, -1, a.out);
+    a.field.add_product(a.positions, StiffnessModel::gauss_newton, a.in, -1, a.out);
     a.add_to(df, scale);
   });
 }
@@ -148,7 +171,7 @@ void DeformablePenaltyForce::addScaledDampingForceDifferential(btScalar scale, c
   for_each_active([&](Attached& a) {
     if (damping_time_ == 0 && !a.field.damps()) return;
     a.read(dv);
-    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    a.damping(damping_time_).add_product(a.in, -1, a.out);
     a.add_to(df, scale);
   });
 }
@@ -157,14 +180,14 @@ void DeformablePenaltyForce::addScaledDampingForceDifferential(btScalar scale, c
 void DeformablePenaltyForce::buildDampingForceDifferentialDiagonal(btScalar scale, TVStack& diagonal) {
   if (damping_time_ == 0) return;
   for_each_active([&](Attached& a) {
-    a.field.add_stiffness_diagonal(a.positions, -damping_time_, a.out);
+    a.stiffness().add_diagonal(-damping_time_, a.out);
     a.add_to(diagonal, scale);
   });
 }
 
 void DeformablePenaltyForce::addScaledHessian(btScalar scale) {
   for_each_active([&](Attached& a) {
-    a.field.add_stiffness_diagonal(a.positions, Real(scale) * Real(scale), a.out);
+    a.stiffness().add_diagonal(Real(scale) * Real(scale), a.out);
     for (int i = 0; i < a.body->m_nodes.size(); ++i)
       for (int axis = 0; axis < 3; ++axis)
         a.body->m_nodes[i].m_effectiveMass[axis][axis] += static_cast<btScalar>(a.out(axis, i));
@@ -183,7 +206,7 @@ double DeformablePenaltyForce::totalDampingEnergy(btScalar time_step) {
   for_each_active([&](Attached& a) {
     if (damping_time_ == 0 && !a.field.damps()) return;
     a.read_velocities();
-    a.field.add_damping_forces(a.positions, a.in, damping_time_, a.out);
+    a.damping(damping_time_).add_product(a.in, -1, a.out);
     sum -= Real(time_step) * a.out.cwiseProduct(a.in).sum();
   });
   return sum;

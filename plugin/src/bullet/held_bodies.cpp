@@ -10,7 +10,7 @@ HeldBody::HeldBody(btSoftBody& soft_body, PotentialField potential_field, const 
       field(std::move(potential_field)),
       options(attach_options),
       nodes(soft_body, stepped.particles) {
-  stepped.potential = &field;
+  stepped.field = &field;
   stepped.options = options.step;
   start = stepped.particles.positions;
 }

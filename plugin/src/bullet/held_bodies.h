@@ -8,6 +8,7 @@
 #include "identity.h"
 #include "nodes.h"
 #include "penalty/bullet/attached_bodies.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty {
 
@@ -42,8 +43,8 @@ struct HeldBody {
   /// Adds what others changed to the state.
   void read_nodes();
 
-  /// The step failed: the body stays where it was at the start, and `problem` goes into the report. `stopped`: at rest; else it
-  /// keeps its velocities. Never throws.
+  /// The step failed: the body stays where it was at the start, and `problem` goes into the report. `stopped`: at rest;
+  /// else it keeps its velocities. Never throws.
   void hold(const char* problem, bool stopped) noexcept;
 };
 
@@ -60,7 +61,8 @@ class HeldBodies {
   HeldBody& add(btSoftBody& body, PotentialField field, const AttachOptions& options);
   void remove(const btSoftBody& body) { bodies_.erase(&body); }
 
-  /// Begins a step: notes which bodies are in the world, and drops the entries at whose address a listed body is another.
+  /// Begins a step: notes which bodies are in the world, and drops the entries at whose address a listed body is
+  /// another.
   void list(std::span<btSoftBody* const> bodies);
 
   bool is_listed(const HeldBody& held) const { return held.listed == step_; }

@@ -9,10 +9,11 @@ namespace penalty {
 /// Zero: none yet.
 using SerialNumber = std::uintptr_t;
 
-/// The serial number that the object carries in its extension pointer. That pointer is Bullet's own slot for extensions:
-/// constructors set it to null, so memory left by another object says nothing; Bullet neither reads, copies, draws nor
-/// writes it to files; it dies with the object; and what applications are given, user pointer and indices, tags,
-/// materials and notes, stays theirs. If another extension has put something there, that is what the object is known by.
+/// The serial number that the object carries in its extension pointer. That pointer is Bullet's own slot for
+/// extensions: constructors set it to null, so memory left by another object says nothing; Bullet neither reads,
+/// copies, draws nor writes it to files; it dies with the object; and what applications are given, user pointer and
+/// indices, tags, materials and notes, stays theirs. If another extension has put something there, that is what the
+/// object is known by.
 SerialNumber serial_of(const btCollisionObject& object);
 
 /// Gives the object a serial number if it has none.

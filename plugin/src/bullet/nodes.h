@@ -21,18 +21,20 @@ struct RejectedNode {
 };
 
 /// Of the nodes only differences to what was last written are read, so that a world in single precision still carries a
-/// simulation in double. Nothing that is not finite in Bullet's precision is written, and nothing that is not finite is read.
+/// simulation in double. Nothing that is not finite in Bullet's precision is written, and nothing that is not finite is
+/// read.
 class Nodes {
  public:
-  /// Fills `particles` from the nodes. Throws std::invalid_argument that names the node whose position, velocity or inverse mass
-  /// is out of range.
+  /// Fills `particles` from the nodes. Throws std::invalid_argument that names the node whose position, velocity or
+  /// inverse mass is out of range.
   Nodes(btSoftBody& body, Particles& particles);
 
   /// Adds what others changed. Numbers that are not finite, and inverse masses that are negative, are set back, see
   /// `rejected`. Throws std::logic_error if the body has another number of nodes than it had.
   NodeChanges read(Particles& particles);
 
-  /// Takes the forces of btSoftBody::addForce; empty if there are none. Returns whether they, or those of the last step, count.
+  /// Takes the forces of btSoftBody::addForce; empty if there are none. Returns whether they, or those of the last
+  /// step, count.
   bool read_forces(PackedVectors& forces);
 
   /// The first number that `read` or `read_forces` set back since `read` began.
@@ -41,15 +43,17 @@ class Nodes {
   /// Whether the particles can be written: all finite in Bullet's precision.
   static bool can_hold(const Particles& particles);
 
-  /// Gives the nodes their place before the step and the mean velocity [m/s] that leads from `start` to the particles in
-  /// `duration` [s]: what Bullet's prediction is to follow. `gravity_dv` is what that prediction adds to free nodes by itself.
+  /// Gives the nodes their place before the step and the mean velocity [m/s] that leads from `start` to the particles
+  /// in `duration` [s]: what Bullet's prediction is to follow. `gravity_dv` is what that prediction adds to free nodes
+  /// by itself.
   void write_mean_velocities(const Particles& particles, const PackedVectors& start, Real duration,
                              const Vector3& gravity_dv);
 
   /// Whatever Bullet makes of the velocities from here on counts.
   void remember_velocities();
 
-  /// Writes the particles; `lead` [s]: previous positions from which the velocities lead to the present ones in that time.
+  /// Writes the particles; `lead` [s]: previous positions from which the velocities lead to the present ones in that
+  /// time.
   void write(const Particles& particles, Real lead = 0);
 
   /// Adds to the particles what was done to the mean velocities, those of split impulses included, over `duration` [s].
@@ -59,8 +63,8 @@ class Nodes {
   /// Turns what position constraints did into velocities.
   void positions_to_velocities(Real inverse_duration);
 
-  /// A step that is none: from `freeze` to `thaw` Bullet finds nodes without velocity and contacts, whatever their number, which
-  /// then have the velocities that were last read or written; after `stop` none.
+  /// A step that is none: from `freeze` to `thaw` Bullet finds nodes without velocity and contacts, whatever their
+  /// number, which then have the velocities that were last read or written; after `stop` none.
   void freeze();
   void thaw();
   void stop();

@@ -41,12 +41,6 @@ class Candidates final : public btBroadphaseAabbCallback {
   const btSoftBody& body_;
 };
 
-Vector3 position_of(const ContactPoint& point, const PackedVectors& vectors) {
-  Vector3 sum = Vector3::Zero();
-  for (int k = 0; k < point.num_particles; ++k) sum += point.weights[k] * vectors.col(point.particles[k]).head<3>();
-  return sum;
-}
-
 Real radius_about_origin(const btCollisionShape& shape) {
   btVector3 center;
   btScalar radius = 0;
@@ -86,7 +80,6 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   SteppedBody& stepped = held.stepped;
   const Particles& particles = stepped.particles;
   btSoftBody& body = *held.body;
-  stepped.contacts.clear();
   if (!body.hasContactResponse()) return true;
 
   const Real margin = body.getCollisionShape()->getMargin();
@@ -101,7 +94,8 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   const Real sweep = fastest * duration + fall + margin;
   if (!std::isfinite(sweep + box.low.sum() + box.high.sum())) return true;
 
-  // Bullet's boxes are those of the last step: look further around, then test each object where it is and as fast as it is.
+  // Bullet's boxes are those of the last step: look further around, then test each object where it is and as fast as it
+  // is.
   const Real around = std::max(sweep, (box.high - box.low).norm());
   bool friction_is_finite = true;
   std::vector<SurfacePoint> surface;
@@ -118,29 +112,29 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       friction = 0;
       friction_is_finite = false;
     }
-    const auto add_point = [&](const ContactPoint& point) {
-      const Vector3 x = position_of(point, particles.positions);
+    const auto add_point = [&](const WeightedPoint& point) {
+      const Vector3 x = point.of(particles.positions);
       if (!object_box.contains(x, reach)) return;
       surface.clear();
       append_surface_points(*object->getCollisionShape(), rotation.transpose() * (x - origin), margin + reach, surface);
-      const Vector3 v = surface.empty() ? Vector3(Vector3::Zero()) : position_of(point, particles.velocities);
+      const Vector3 v = surface.empty() ? Vector3(Vector3::Zero()) : point.of(particles.velocities);
       for (const SurfacePoint& nearest : surface) {
         const bool approached = -v.dot(rotation * nearest.normal) > waking_speed;
-        Contact contact;
-        contact.point = point;
-        contact.rigid_body = rigid_bodies.touch(*object, approached, island.touched);
-        contact.radius = nearest.radius > 0 ? nearest.radius + margin : 0;
-        contact.anchor = nearest.point + (margin - contact.radius) * nearest.normal;
-        contact.normal = nearest.normal;
-        contact.friction = friction;
-        stepped.contacts.push_back(contact);
+        const Real radius = nearest.radius > 0 ? nearest.radius + margin : 0;
+        const Vector3 anchor = nearest.point + (margin - radius) * nearest.normal;
+        const int touched = rigid_bodies.touch(*object, approached, island.touched);
+        island.contacts.push_back({.a = Side::of_particles(0, point),
+                                   .b = Side::of_rigid(touched, anchor),
+                                   .normal = nearest.normal,
+                                   .radius = radius,
+                                   .friction = friction});
       }
     };
     if (held.options.contact_points.empty()) {
       for (int i = 0; i < particles.size(); ++i)
-        if (particles.inverse_masses[i] > 0) add_point(ContactPoint::at_particle(i));
+        if (particles.inverse_masses[i] > 0) add_point(WeightedPoint::at_particle(i));
     } else {
-      for (const ContactPoint& point : held.options.contact_points) add_point(point);
+      for (const WeightedPoint& point : held.options.contact_points) add_point(point);
     }
   }
   return friction_is_finite;

@@ -33,10 +33,11 @@ struct Box {
 
 Box bounds_of(const btCollisionObject& object);
 
-/// The objects whose boxes overlap that of the soft body, padded [m], and which it may touch, in the order in which they came into the world.
+/// The objects whose boxes overlap that of the soft body, padded [m], and which it may touch, in the order in which
+/// they came into the world.
 std::vector<btCollisionObject*> obstacles_near(btSoftBody& body, const Box& box, Real padding);
 
-/// Sets the contacts of a body that is about to be stepped and takes what it may touch into its island. Returns false
+/// Adds to the island of one body, which is about to be stepped, its contacts and what it may touch. Returns false
 /// if the friction of an object is no number, and was left out.
 bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies, Real duration);
 

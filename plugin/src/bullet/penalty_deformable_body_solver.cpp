@@ -8,8 +8,9 @@
 namespace penalty {
 namespace {
 
-// Bullet's trees over faces and nodes serve contact between soft bodies. They take quadratic time to build, and where links
-// do not connect all nodes their construction never ends: an attached body has them only if it asks for that contact.
+// Bullet's trees over faces and nodes serve contact between soft bodies. They take quadratic time to build, and where
+// links do not connect all nodes their construction never ends: an attached body has them only if it asks for that
+// contact.
 void update_constants(btSoftBody& body) {
   if (!body.m_bUpdateRtCst) return;
   body.m_bUpdateRtCst = false;

@@ -6,8 +6,8 @@
 namespace penalty {
 namespace {
 
-// What of Bullet's position constraints is left to an attached body: contacts with other soft bodies and anchors. Its links
-// are replaced by the field.
+// What of Bullet's position constraints is left to an attached body: contacts with other soft bodies and anchors. Its
+// links are replaced by the field.
 bool has_position_constraints(const btSoftBody& body) {
   return body.m_anchors.size() > 0 || body.m_scontacts.size() > 0 || body.m_clusters.size() > 0;
 }
@@ -39,8 +39,8 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
     const Vector3 gravity_dv = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_cfg.timescale * time_step);
     held->nodes.write_mean_velocities(particles, held->stepped.start.positions, time_step, gravity_dv);
     body.predictMotion(time_step);
-    // A start position from which the end velocity leads to the end position: whatever Bullet's position constraints then do
-    // arrives as a change of that velocity.
+    // A start position from which the end velocity leads to the end position: whatever Bullet's position constraints
+    // then do arrives as a change of that velocity.
     held->nodes.write(particles, body.m_sst.sdt);
   }
   attached_->freeze_held(bodies);

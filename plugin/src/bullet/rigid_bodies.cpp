@@ -7,8 +7,8 @@
 namespace penalty {
 namespace {
 
-// What will accelerate the body besides contacts. The classic world adds all forces in its own solver, later; the deformable
-// world has already added gravity to the velocity, and with it the forces of the application.
+// What will accelerate the body besides contacts. The classic world adds all forces in its own solver, later; the
+// deformable world has already added gravity to the velocity, and with it the forces of the application.
 Vector3 known_acceleration(const btRigidBody& body, bool gravity_applied) {
   const Vector3 factor = to_vector(body.getLinearFactor());
   return gravity_applied ? Vector3(to_vector(body.getGravity()).cwiseProduct(factor))

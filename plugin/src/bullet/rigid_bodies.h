@@ -24,14 +24,15 @@ class RigidBodies {
   /// `gravity_applied`: the world has already added gravity to the velocities of rigid bodies.
   void begin_step(Real duration, bool gravity_applied);
 
-  /// The index of the object among those of an island, taking it in if it is new and waking it if a soft body comes at it.
+  /// The index of the object among those of an island, taking it in if it is new and waking it if a soft body comes at
+  /// it.
   int touch(btCollisionObject& object, bool approached, std::vector<TouchedRigidBody>& touched) const;
 
   /// Adds to the velocities what soft bodies did to them.
   void hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states);
 
-  /// Moves touched bodies from where Bullet's integration with the end velocity put them to where the sub-cycle took them. Call
-  /// after Bullet has integrated the transforms.
+  /// Moves touched bodies from where Bullet's integration with the end velocity put them to where the sub-cycle took
+  /// them. Call after Bullet has integrated the transforms.
   static void correct(std::span<const TouchedRigidBody> touched, Real duration);
 
  private:

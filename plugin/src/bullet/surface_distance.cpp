@@ -98,8 +98,8 @@ class NearestTriangle final : public btTriangleCallback {
     face /= twice_area;
     const Vector3 nearest = nearest_on_triangle(point_, a, b, c);
     const Real distance = (point_ - nearest).norm();
-    // Triangles that share the nearest edge or vertex are equally near: the one that faces the point most squarely knows its
-    // side, also where they meet at a sharp angle.
+    // Triangles that share the nearest edge or vertex are equally near: the one that faces the point most squarely
+    // knows its side, also where they meet at a sharp angle.
     const Real height = (point_ - nearest).dot(face);
     const Real tie = same_distance * (distance + std::sqrt(twice_area));
     if (distance > nearest_ + tie || (distance > nearest_ - tie && std::abs(height) <= height_)) return;

@@ -8,8 +8,8 @@ class btCollisionShape;
 
 namespace penalty {
 
-/// The nearest point of a surface. `distance` is negative inside; `normal` points outwards. A positive `radius` says that the
-/// surface is round there: it keeps this distance from point - radius * normal.
+/// The nearest point of a surface. `distance` is negative inside; `normal` points outwards. A positive `radius` says
+/// that the surface is round there: it keeps this distance from point - radius * normal.
 struct SurfacePoint {
   Vector3 point, normal;
   Real distance;
@@ -17,8 +17,9 @@ struct SurfacePoint {
 };
 
 /// Appends the nearest surface points of `shape` to `point`, in the frame of the shape and within `reach` [m], one for
-/// each convex part. In closed form for planes, spheres, boxes and capsules; by GJK and EPA for other convex shapes; child by
-/// child for compounds; by the nearest triangle for concave meshes, whose triangles face the counter-clockwise side.
+/// each convex part. In closed form for planes, spheres, boxes and capsules; by GJK and EPA for other convex shapes;
+/// child by child for compounds; by the nearest triangle for concave meshes, whose triangles face the counter-clockwise
+/// side.
 void append_surface_points(const btCollisionShape& shape, const Vector3& point, Real reach,
                            std::vector<SurfacePoint>& found);
 

@@ -15,10 +15,16 @@ void WorldIsland::absorb(WorldIsland& from) {
     renumbered.push_back(static_cast<int>(known - touched.begin()));
     if (known == touched.end()) touched.push_back(other);
   }
-  for (HeldBody* body : from.held) {
-    for (Contact& contact : body->stepped.contacts) contact.rigid_body = renumbered[contact.rigid_body];
-    held.push_back(body);
+  const auto first = static_cast<int>(held.size());
+  for (Contact contact : from.contacts) {
+    for (Side* side : {&contact.a, &contact.b})
+      if (side->is_rigid())
+        side->rigid = renumbered[side->rigid];
+      else
+        side->body += first;
+    contacts.push_back(contact);
   }
+  held.insert(held.end(), from.held.begin(), from.held.end());
   couplings.insert(couplings.end(), from.couplings.begin(), from.couplings.end());
   from = {};
 }
@@ -30,32 +36,32 @@ bool WorldIsland::shares_a_rigid_body_with(const WorldIsland& other) const {
   return false;
 }
 
-void WorldIsland::advance(Real duration, std::vector<RigidBody>& states) {
-  std::vector<SteppedBody*> bodies;
-  for (HeldBody* body : held) bodies.push_back(&body->stepped);
-  states.clear();
-  for (const TouchedRigidBody& t : touched) states.push_back(t.start);
-  std::vector<Coupling*> stepped_couplings;
+void WorldIsland::advance(Real duration, Island& island) {
+  island.bodies.clear();
+  for (HeldBody* body : held) island.bodies.push_back(&body->stepped);
+  island.rigid_bodies.clear();
+  for (const TouchedRigidBody& t : touched) island.rigid_bodies.push_back(t.start);
+  island.contacts = contacts;
+  island.couplings.clear();
   for (HeldCoupling* coupling : couplings) {
     for (std::size_t k = 0; k < coupling->points.size(); ++k) {
       const HeldPoint& point = coupling->points[k];
-      CoupledPoint& coupled = coupling->stepped.points[k];
+      Side& side = coupling->stepped.points[k];
       if (point.soft) {
         const auto body = std::find(held.begin(), held.end(), point.soft);
-        coupled = {.body = static_cast<int>(body - held.begin()), .particle = point.point.node};
+        side = Side::of_particles(static_cast<int>(body - held.begin()), point.point.point);
       } else {
         const auto body = std::find_if(touched.begin(), touched.end(),
                                        [&](const TouchedRigidBody& t) { return t.body == point.rigid; });
-        coupled = {.rigid_body = static_cast<int>(body - touched.begin()), .anchor = point.point.anchor};
+        side = Side::of_rigid(static_cast<int>(body - touched.begin()), point.point.anchor);
       }
     }
     const std::uint64_t version = coupling->field.stiffness_version();
-    estimate_stability(coupling->stepped, bodies, states, coupling->field.rest_positions(),
-                       version != coupling->estimated_version);
+    estimate_stability(coupling->stepped, island, version != coupling->estimated_version);
     coupling->estimated_version = version;
-    stepped_couplings.push_back(&coupling->stepped);
+    island.couplings.push_back(&coupling->stepped);
   }
-  penalty::advance(bodies, states, duration, stepped_couplings);
+  penalty::advance(island, duration);
 }
 
 }  // namespace penalty

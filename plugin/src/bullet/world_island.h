@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 #include "rigid_bodies.h"
 
 namespace penalty {
@@ -10,10 +10,12 @@ namespace penalty {
 struct HeldBody;
 struct HeldCoupling;
 
+/// Body k of the island is held[k], rigid body k touched[k].
 struct WorldIsland {
   std::vector<HeldBody*> held;
   std::vector<TouchedRigidBody> touched;
   std::vector<HeldCoupling*> couplings;
+  std::vector<Contact> contacts;
 
   /// Takes in what `from` holds, which is empty afterwards.
   void absorb(WorldIsland& from);
@@ -21,8 +23,8 @@ struct WorldIsland {
   /// Whether both touch the same movable body.
   bool shares_a_rigid_body_with(const WorldIsland& other) const;
 
-  /// Advances all of it [s]; afterwards `states` are those of the touched bodies.
-  void advance(Real duration, std::vector<RigidBody>& states);
+  /// Advances all of it [s]; afterwards `island.rigid_bodies` are the states of the touched bodies.
+  void advance(Real duration, Island& island);
 };
 
 }  // namespace penalty

@@ -145,7 +145,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   }
   stepped.gravity = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_gravityFactor);
   if (held.stale || held.estimated_version != held.field.stiffness_version()) {
-    estimate_stability(stepped, held.field.rest_positions());
+    estimate_stability(stepped);
     held.stale = false;
     held.estimated_version = held.field.stiffness_version();
   }
@@ -178,8 +178,8 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
   };
   shield(
       [&] {
-        island.advance(duration, states_);
-        rigid_bodies_.hand_back(island.touched, states_);
+        island.advance(duration, island_);
+        rigid_bodies_.hand_back(island.touched, island_.rigid_bodies);
       },
       hold_island);
   for (HeldBody* held : island.held) {

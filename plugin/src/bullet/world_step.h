@@ -11,16 +11,17 @@
 
 namespace penalty {
 
-/// The attached bodies of one solver and their way through a world step. Nothing here throws through Bullet's frames: a body
-/// that cannot be stepped is held where it is, and its report says why.
+/// The attached bodies of one solver and their way through a world step. Nothing here throws through Bullet's frames: a
+/// body that cannot be stepped is held where it is, and its report says why.
 class AttachedBodies::World {
  public:
   std::shared_ptr<HeldBodies> bodies = std::make_shared<HeldBodies>();  // handles look at it, too
   Couplings couplings;
 
-  /// Steps the attached and active ones of `listed`, all soft bodies of the world, from what their nodes say, together with the
-  /// rigid bodies that they touch, whose velocities change. `gravity_applied`: the world has already added gravity to the
-  /// velocities of rigid bodies. Returns the bodies that were stepped; their nodes are still to be written.
+  /// Steps the attached and active ones of `listed`, all soft bodies of the world, from what their nodes say, together
+  /// with the rigid bodies that they touch, whose velocities change. `gravity_applied`: the world has already added
+  /// gravity to the velocities of rigid bodies. Returns the bodies that were stepped; their nodes are still to be
+  /// written.
   std::span<HeldBody* const> step(std::span<btSoftBody* const> listed, Real duration, bool gravity_applied) noexcept;
 
   /// Takes what Bullet's constraints made of the nodes after they were written.
@@ -42,7 +43,7 @@ class AttachedBodies::World {
 
   RigidBodies rigid_bodies_;
   std::vector<WorldIsland> islands_;
-  std::vector<RigidBody> states_;
+  Island island_;  // the one that is being advanced; keeps its memory
   std::vector<HeldBody*> stepped_;
 };
 

@@ -1,6 +1,9 @@
 #include "penalty/fields/batch.h"
 
+#include "penalty/fields/batch_loops.h"
+
 namespace penalty {
+namespace detail {
 
 // GCC compiles one function twice and the loader picks: fused multiply-add and three-operand instructions are worth a
 // fifth of the time. Elsewhere there is only the plain one.
@@ -13,16 +16,29 @@ Real add_own_element_forces(const std::array<int, static_cast<std::size_t>(Kind:
   return add_element_forces(stencils, kinds, stiffnesses, size, x, f);
 }
 
-template class Batch<Length>;
-template class Batch<TriangleArea>;
-template class Batch<TetrahedronVolume>;
-template class Batch<CornerAngle>;
-template class Batch<TetrahedronDihedralAngle>;
-template class Batch<BendingAngle>;
-template class Batch<Distance>;
-template class Batch<Attachment>;
-template class Batch<EnclosedVolume>;
-template class Batch<ShapeMatch>;
-template class Batch<StableNeoHookean>;
+}  // namespace detail
+
+namespace {
+
+template <class Kind>
+std::unique_ptr<ElementBatch> make(int num_particles, std::string name) {
+  return std::make_unique<Batch<Kind>>(num_particles, std::move(name));
+}
+
+// The addresses of the makers escape in this table: that is what makes the compiler emit every batch of the list here,
+// once.
+template <class... Kinds>
+constexpr auto table_of(KindList<Kinds...>) {
+  return std::array{KindEntry{Kinds::name, Kinds::num_points, &make<Kinds>}...};
+}
+constexpr auto table = table_of(OwnKinds{});
+
+}  // namespace
+
+std::unique_ptr<ElementBatch> detail::make_own_batch(std::size_t kind, int num_particles, std::string name) {
+  return table[kind].make(num_particles, std::move(name));
+}
+
+std::span<const KindEntry> own_kinds() { return table; }
 
 }  // namespace penalty

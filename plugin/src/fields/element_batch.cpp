@@ -1,7 +1,9 @@
 #include "penalty/fields/element_batch.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace penalty {
 namespace {
@@ -53,21 +55,21 @@ void ElementBatch::check_stiffness(std::size_t element, Real stiffness) const {
 
 void ElementBatch::append_element(Real stiffness) {
   stiffnesses_.push_back(stiffness);
-  const std::size_t size = stiffnesses_.size();
+  const std::size_t size = num_elements_ = stiffnesses_.size();
   if (!profiles_.empty()) profiles_to_change();
   if (!plasticities_.empty()) plasticities_.resize(size);
   if (!plastic_strains_.empty()) plastic_strains_.resize(size);
   if (!breakings_.empty()) breakings_.resize(size);
   if (!damping_times_.empty()) damping_times_.resize(size);
   if (!disabled_stiffnesses_.empty()) disabled_stiffnesses_.resize(size);
-  ++version_;
+  ++stiffness_version_;
 }
 
 void ElementBatch::set_stiffness(int element, Real stiffness) {
   const std::size_t e = check(element);
   check_stiffness(e, stiffness);
   (stiffnesses_[e] > 0 ? stiffnesses_ : disabled_stiffnesses_)[e] = stiffness;
-  ++version_;
+  ++stiffness_version_;
 }
 
 std::vector<Profile>& ElementBatch::profiles_to_change() {
@@ -114,6 +116,7 @@ void ElementBatch::set_plasticity(int element, const Plasticity& plasticity) {
   profiles_to_change();
   full(plastic_strains_, num_elements());
   full(plasticities_, num_elements())[e] = plasticity;
+  evolves_ = true;
 }
 
 void ElementBatch::set_plasticity(const Plasticity& plasticity) {
@@ -129,6 +132,7 @@ void ElementBatch::set_breaking(int element, const Breaking& breaking) {
   const std::size_t e = check(element);
   breaking.check();
   full(breakings_, num_elements())[e] = breaking;
+  evolves_ = true;
 }
 
 void ElementBatch::set_breaking(const Breaking& breaking) {
@@ -140,6 +144,7 @@ void ElementBatch::set_damping_time(int element, Real time) {
   if (!(time >= 0) || !std::isfinite(time))
     fail(e, "damping time is " + to_text(time) + " s, must be zero or positive");
   full(damping_times_, num_elements())[e] = time;
+  damps_ = true;
 }
 
 void ElementBatch::set_damping_time(Real time) {
@@ -158,7 +163,7 @@ void ElementBatch::set_enabled(int element, bool enabled) {
   if (enabled) {
     stiffnesses_[e] = disabled_stiffnesses_[e];
     --num_disabled_;
-    ++version_;
+    ++stiffness_version_;
   } else {
     disable(e);
   }
@@ -185,43 +190,65 @@ Real ElementBatch::evolve_element(std::size_t e, Real c, Real duration) {
   return before - energy_at(s);
 }
 
-void ElementBatch::save_state() {
-  if (!evolves()) return;
-  saved_.profiles = profiles_;
-  saved_.plastic_strains = plastic_strains_;
-  saved_.stiffnesses = stiffnesses_;
-  saved_.disabled_stiffnesses = disabled_stiffnesses_;
-  saved_.num_breaks = breaks_.size();
-  saved_.num_disabled = num_disabled_;
+// How many stiffnesses, stiffnesses of disabled elements, targets, plastic strains and breaks there are, then all of
+// them. Of elements that are as they were added: none.
+void ElementBatch::append_state(std::vector<Real>& state) const {
+  const bool is_default = is_plain() && !evolves_ && breaks_.empty();
+  const std::size_t size = is_default ? 0 : num_elements();
+  for (const std::size_t count :
+       {size, is_default ? 0 : disabled_stiffnesses_.size(), profiles_.size(), plastic_strains_.size(), breaks_.size()})
+    state.push_back(static_cast<Real>(count));
+  if (is_default) return;
+  state.insert(state.end(), stiffnesses_.begin(), stiffnesses_.end());
+  state.insert(state.end(), disabled_stiffnesses_.begin(), disabled_stiffnesses_.end());
+  for (const Profile& profile : profiles_) state.push_back(profile.target);
+  state.insert(state.end(), plastic_strains_.begin(), plastic_strains_.end());
+  for (const Break& event : breaks_)
+    state.insert(state.end(), {static_cast<Real>(event.element), event.strain, event.energy});
 }
 
-void ElementBatch::restore_state() {
-  if (!evolves()) return;
-  profiles_ = saved_.profiles;
-  plastic_strains_ = saved_.plastic_strains;
-  stiffnesses_ = saved_.stiffnesses;
-  disabled_stiffnesses_ = saved_.disabled_stiffnesses;
-  breaks_.resize(saved_.num_breaks, Break{});
-  num_disabled_ = saved_.num_disabled;
-}
-
-void ElementBatch::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
-  std::vector<Real> strains, energies;
-  append_strains(x, strains);
-  append_energies(x, energies);
-  LedgerEntry entry{.name = name_, .num_elements = num_elements()};
-  for (std::size_t e = 0; e < num_elements(); ++e) {
-    if (!(stiffnesses_[e] > 0)) continue;
-    const Real strain = std::abs(strains[e]);
-    entry.energy += energies[e];
-    entry.mean_strain += strain;
-    if (entry.num_enabled++ == 0 || strain > entry.largest_strain) {
-      entry.largest_strain = strain;
-      entry.largest_element = static_cast<int>(e);
-    }
+std::size_t ElementBatch::set_state(std::span<const Real> state) {
+  constexpr std::size_t num_counts = 5;
+  std::size_t counts[num_counts], total = num_counts;
+  for (std::size_t k = 0; k < num_counts; ++k) {
+    const Real count = k < state.size() ? state[k] : -1;
+    const bool is_list_of_breaks = k + 1 == num_counts;
+    if (!(count >= 0 && count <= static_cast<Real>(state.size())) ||
+        !(is_list_of_breaks || count == 0 || count == static_cast<Real>(num_elements())))
+      throw std::invalid_argument(name_ + ": the state is not one of these " + std::to_string(num_elements()) +
+                                  " elements: it holds " + to_text(count));
+    counts[k] = static_cast<std::size_t>(count);
+    total += is_list_of_breaks ? 3 * counts[k] : counts[k];
   }
-  if (entry.num_enabled > 0) entry.mean_strain /= static_cast<Real>(entry.num_enabled);
-  ledger.push_back(std::move(entry));
+  if (total > state.size())
+    throw std::invalid_argument(name_ + ": the state ends early, after " + std::to_string(state.size()) + " of " +
+                                std::to_string(total) + " numbers");
+  const Real* next = state.data() + num_counts;
+  const auto take = [&](std::size_t count) { return std::span(std::exchange(next, next + count), count); };
+
+  if (counts[0] > 0) {
+    const auto stiffnesses = take(counts[0]), disabled = take(counts[1]);
+    stiffnesses_.assign(stiffnesses.begin(), stiffnesses.end());
+    disabled_stiffnesses_.assign(disabled.begin(), disabled.end());
+    num_disabled_ = static_cast<std::size_t>(std::count(stiffnesses_.begin(), stiffnesses_.end(), 0));
+  } else {
+    for (std::size_t e = 0; e < num_elements(); ++e) stiffnesses_[e] = own_stiffness(e);
+    num_disabled_ = 0;
+  }
+  const auto targets = take(counts[2]);
+  if (!targets.empty()) profiles_to_change();
+  for (std::size_t e = 0; e < profiles_.size(); ++e) profiles_[e].target = targets.empty() ? 0 : targets[e];
+  const auto plastic = take(counts[3]);
+  if (plastic.empty())
+    std::fill(plastic_strains_.begin(), plastic_strains_.end(), 0);
+  else
+    plastic_strains_.assign(plastic.begin(), plastic.end());
+  breaks_.clear();
+  for (std::size_t k = 0; k < counts[4]; ++k) {
+    const auto event = take(3);
+    breaks_.push_back({static_cast<int>(event[0]), event[1], event[2]});
+  }
+  return total;
 }
 
 }  // namespace penalty

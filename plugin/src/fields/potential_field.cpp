@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+#include <iterator>
 
 namespace penalty {
 
@@ -17,8 +16,85 @@ PotentialField::PotentialField(const Eigen::Matrix3Xd& rest_positions) : rest_(p
 
 Potential& PotentialField::add(std::unique_ptr<Potential> potential) {
   if (!potential) throw std::invalid_argument("field: null potential");
+  phases_.reserve(phases_.size() + 1);
   potentials_.push_back(std::move(potential));
+  phases_.emplace_back();
   return *potentials_.back();
+}
+
+void PotentialField::check_size(const PotentialField& other, const char* what) const {
+  if (other.num_particles() != num_particles())
+    throw std::invalid_argument("field: " + std::string(what) + " has " + std::to_string(other.num_particles()) +
+                                " particles, this one " + std::to_string(num_particles()));
+}
+
+void PotentialField::add(PotentialField field) {
+  check_size(field, "the field to be added");
+  const auto first = static_cast<int>(switches_.size());
+  for (Phase& phase : field.phases_)
+    if (phase.decided_by >= 0) phase.decided_by += first;
+  switches_.reserve(switches_.size() + field.switches_.size());
+  phases_.reserve(phases_.size() + field.phases_.size());
+  potentials_.reserve(potentials_.size() + field.potentials_.size());
+  std::move(field.switches_.begin(), field.switches_.end(), std::back_inserter(switches_));
+  std::move(field.phases_.begin(), field.phases_.end(), std::back_inserter(phases_));
+  std::move(field.potentials_.begin(), field.potentials_.end(), std::back_inserter(potentials_));
+}
+
+void PotentialField::add_soft_phase(std::span<const Tetrahedron> tetrahedra, PotentialField soft,
+                                    const PhaseThresholds& thresholds) {
+  check_size(soft, "the soft phase");
+  if (!switches_.empty() || !soft.switches_.empty())
+    throw std::invalid_argument("field: one of the phases is of two phases itself");
+  switches_.emplace_back(tetrahedra, rest_, thresholds);
+  phases_.assign(potentials_.size(), {.decided_by = 0, .soft = false});
+  phases_.insert(phases_.begin(), soft.potentials_.size(), {.decided_by = 0, .soft = true});
+  potentials_.insert(potentials_.begin(), std::make_move_iterator(soft.potentials_.begin()),
+                     std::make_move_iterator(soft.potentials_.end()));
+}
+
+bool PotentialField::is_soft() const {
+  return std::any_of(switches_.begin(), switches_.end(), [](const PhaseSwitch& s) { return s.is_far; });
+}
+
+Real PotentialField::largest_strain(const Positions& x) const {
+  Real largest = 0;
+  for (const PhaseSwitch& phases : switches_) largest = std::max(largest, phases.largest_strain(x));
+  return largest;
+}
+
+Real PotentialField::choose_phase(const Positions& x) {
+  Real added = 0;
+  for (std::size_t k = 0; k < switches_.size(); ++k) {
+    if (switches_[k].looks_far(x) == switches_[k].is_far) continue;
+    const auto energy_of_phase = [&] {
+      Real sum = 0;
+      for (std::size_t p = 0; p < potentials_.size(); ++p)
+        if (phases_[p].decided_by == static_cast<int>(k) && acts(p)) sum += potentials_[p]->energy(x);
+      return sum;
+    };
+    const Real before = energy_of_phase();
+    switches_[k].is_far = !switches_[k].is_far;
+    added += energy_of_phase() - before;
+  }
+  return added;
+}
+
+ElementBatch* PotentialField::find(std::string_view name) {
+  return static_cast<ElementBatch*>(
+      find_if([name](const Potential& p) { return dynamic_cast<const ElementBatch*>(&p) && p.name() == name; }));
+}
+
+ElementBatch& PotentialField::batch(std::string_view name) {
+  if (ElementBatch* found = find(name)) return *found;
+  fail_to_find("no batch \"" + std::string(name) + "\"");
+}
+
+void PotentialField::fail_to_find(const std::string& what) const {
+  std::string names;
+  for (const auto& potential : potentials_)
+    names += (names.empty() ? "\"" : ", \"") + std::string(potential->name()) + "\"";
+  throw std::invalid_argument("field: " + what + "; there is " + (names.empty() ? "nothing" : names));
 }
 
 std::size_t PotentialField::num_elements() const {
@@ -29,85 +105,67 @@ std::size_t PotentialField::num_elements() const {
 
 Real PotentialField::energy(const Positions& x) const {
   Real sum = 0;
-  for (const auto& potential : potentials_) sum += potential->energy(x);
+  for_each_acting([&](const Potential& p) { sum += p.energy(x); });
   return sum;
 }
 
 Real PotentialField::add_forces(const Positions& x, Forces f) const {
   Real sum = 0;
-  for (const auto& potential : potentials_) sum += potential->add_forces(x, f);
+  for_each_acting([&](const Potential& p) { sum += p.add_forces(x, f); });
   return sum;
 }
 
-void PotentialField::add_damping_forces(const Positions& x, const Vectors& v, Real time, Forces f) const {
-  for (const auto& potential : potentials_) potential->add_damping_forces(x, v, time, f);
+void PotentialField::add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const {
+  const auto add = [&](const Potential& p) { p.add_stiffness(x, model, stiffness); };
+  if (stiffness.is_counting())
+    for (const auto& potential : potentials_) add(*potential);
+  else if (model == StiffnessModel::taut)
+    for_each_stiff(add);
+  else
+    for_each_acting(add);
 }
 
-void PotentialField::add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const {
-  for (const auto& potential : potentials_) potential->add_stiffness(x, model, stiffness);
+void PotentialField::add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
+                                 Forces df) const {
+  const auto add = [&](const Potential& p) { p.add_product(x, model, dx, scale, df); };
+  if (model == StiffnessModel::taut)
+    for_each_stiff(add);
+  else
+    for_each_acting(add);
 }
 
-void PotentialField::append_pattern(std::vector<std::pair<int, int>>& pattern) const {
-  for (const auto& potential : potentials_) potential->append_pattern(pattern);
+void PotentialField::add_bounds(const Positions& x, std::span<Real> bounds) const {
+  for_each_stiff([&](const Potential& p) { p.add_bounds(x, bounds); });
 }
 
-void PotentialField::append_rank_one_terms(const Positions& x, StiffnessModel model,
-                                           std::vector<RankOneTerm>& terms) const {
-  for (const auto& potential : potentials_) potential->append_rank_one_terms(x, model, terms);
-}
-
-void PotentialField::add_damping(const Positions& x, Real time, BlockMatrix& damping) const {
-  for (const auto& potential : potentials_) potential->add_damping(x, time, damping);
-}
-
-void PotentialField::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
-  for (const auto& potential : potentials_) potential->append_damping_terms(x, time, terms);
-}
-
-Real PotentialField::choose_phase(const Positions& x) {
-  Real added = 0;
-  for (const auto& potential : potentials_) added += potential->choose_phase(x);
-  return added;
-}
-
-void PotentialField::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
-                                           Forces df) const {
-  for (const auto& potential : potentials_) potential->add_stiffness_product(x, model, dx, scale, df);
-}
-
-void PotentialField::add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const {
-  for (const auto& potential : potentials_) potential->add_stiffness_diagonal(x, scale, diagonal);
-}
-
-void PotentialField::add_stiffness_bounds(const Positions& x, std::span<Real> bounds) const {
-  for (const auto& potential : potentials_) potential->add_stiffness_bounds(x, bounds);
+void PotentialField::add_damping(const Positions& x, Real time, System& damping) const {
+  if (damping.is_counting())
+    for (const auto& potential : potentials_) potential->add_damping(x, time, damping);
+  else
+    for_each_acting([&](const Potential& p) { p.add_damping(x, time, damping); });
 }
 
 void PotentialField::dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
                                Forces v) const {
-  for (const auto& potential : potentials_) potential->dissipate(x, inverse_masses, time, duration, v);
+  for_each_acting([&](const Potential& p) { p.dissipate(x, inverse_masses, time, duration, v); });
 }
 
 bool PotentialField::damps() const {
-  return std::any_of(potentials_.begin(), potentials_.end(), [](const auto& p) { return p->damps(); });
+  bool any = false;
+  for_each_acting([&](const Potential& p) { any = any || p.damps(); });
+  return any;
 }
 
 bool PotentialField::evolves() const {
-  return std::any_of(potentials_.begin(), potentials_.end(), [](const auto& p) { return p->evolves(); });
+  bool any = false;
+  for_each_acting([&](const Potential& p) { any = any || p.evolves(); });
+  return any;
 }
 
 Real PotentialField::evolve(const Positions& x, Real duration) {
   Real taken = 0;
-  for (const auto& potential : potentials_) taken += potential->evolve(x, duration);
+  for_each_acting([&](Potential& p) { taken += p.evolve(x, duration); });
   return taken;
-}
-
-void PotentialField::save_state() {
-  for (const auto& potential : potentials_) potential->save_state();
-}
-
-void PotentialField::restore_state() {
-  for (const auto& potential : potentials_) potential->restore_state();
 }
 
 std::uint64_t PotentialField::stiffness_version() const {
@@ -116,69 +174,38 @@ std::uint64_t PotentialField::stiffness_version() const {
   return sum;
 }
 
-void PotentialField::append_strains(const Positions& x, std::vector<Real>& strains) const {
-  for (const auto& potential : potentials_) potential->append_strains(x, strains);
+void PotentialField::visit_elements(const Positions& x, const ElementVisitor& visit) const {
+  for (std::size_t k = 0; k < potentials_.size(); ++k)
+    if (acts(k))
+      potentials_[k]->visit_elements(x, visit);
+    else
+      potentials_[k]->visit_elements(x, [&](const ElementView& element) {
+        visit({.stencil = element.stencil, .strain = 0, .energy = 0, .enabled = false});
+      });
 }
 
-void PotentialField::append_energies(const Positions& x, std::vector<Real>& energies) const {
-  for (const auto& potential : potentials_) potential->append_energies(x, energies);
+FieldState PotentialField::state() const {
+  FieldState state;
+  get_state(state);
+  return state;
 }
 
-void PotentialField::add_particle_energies(const Positions& x, std::span<Real> energies) const {
-  for (const auto& potential : potentials_) potential->add_particle_energies(x, energies);
+void PotentialField::get_state(FieldState& state) const {
+  state.values.clear();
+  for (const PhaseSwitch& phases : switches_) state.values.push_back(phases.is_far);
+  for (const auto& potential : potentials_) potential->append_state(state.values);
 }
 
-void PotentialField::append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const {
-  for (const auto& potential : potentials_) potential->append_ledger(x, ledger);
-}
-
-ElementBatch* PotentialField::find(std::string_view name) {
-  for (const auto& potential : potentials_) {
-    if (auto* batch = dynamic_cast<ElementBatch*>(potential.get()); batch && batch->name() == name) return batch;
-    if (auto* field = dynamic_cast<PotentialField*>(potential.get()))
-      if (auto* batch = field->find(name)) return batch;
-  }
-  return nullptr;
-}
-
-PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
-                                  Real stiffness) {
-  PotentialField field(vertices);
-  field.add<Length>(edges_of(tetrahedra), stiffness);
-  field.add<TetrahedronVolume>(tetrahedra, stiffness);
-  return field;
-}
-
-PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
-                                  const Material& material, ElasticModel model) {
-  material.check(model);
-  PotentialField field(vertices);
-  std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
-  for (Real& volume : volumes) volume = std::abs(volume);
-  const auto scaled = [](std::vector<Real> shares, Real density) {
-    for (Real& share : shares) share *= density;
-    return shares;
-  };
-  if (model == ElasticModel::neo_hookean) {
-    field.add(StableNeoHookean::with_ratio(material.lame_lambda() / material.lame_mu()), tetrahedra,
-              scaled(volumes, material.lame_mu()));
-  } else {
-    const std::vector<Edge> edges = edges_of(tetrahedra);
-    field.add<Length>(edges,
-                      scaled(edge_volume_shares(edges, tetrahedra, volumes), material.length_stiffness_density(model)));
-    if (material.area_stiffness_density(model) > 0) {
-      const std::vector<Triangle> faces = faces_of(tetrahedra);
-      field.add<TriangleArea>(
-          faces, scaled(face_volume_shares(faces, tetrahedra, volumes), material.area_stiffness_density(model)));
-    }
-    // The least Poisson ratio, computed in floating point, may leave a volume term of either sign in the last digits.
-    const Real density = material.volume_stiffness_density(model);
-    if (density > 1e-12 * material.young) field.add<TetrahedronVolume>(tetrahedra, scaled(volumes, density));
-  }
-  if (material.damping > 0)
-    for (const auto& potential : field.potentials())
-      dynamic_cast<ElementBatch&>(*potential).set_damping_time(material.damping);
-  return field;
+void PotentialField::set_state(const FieldState& state) {
+  std::span<const Real> values = state.values;
+  if (values.size() < switches_.size())
+    throw std::invalid_argument("field: the state holds " + std::to_string(values.size()) + " numbers for " +
+                                std::to_string(switches_.size()) + " phases and what they hold");
+  for (std::size_t k = 0; k < switches_.size(); ++k) switches_[k].is_far = values[k] != 0;
+  values = values.subspan(switches_.size());
+  for (const auto& potential : potentials_) values = values.subspan(potential->set_state(values));
+  if (!values.empty())
+    throw std::invalid_argument("field: the state holds " + std::to_string(values.size()) + " numbers too many");
 }
 
 }  // namespace penalty

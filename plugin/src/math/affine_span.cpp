@@ -13,7 +13,8 @@ constexpr Real flat = 1e-6;             // spread that counts as none, of the sc
 constexpr Real unfolded_share = 0.1;    // of the rest shape that is added,
 constexpr Real unfolded_jitter = 1e-3;  // and of the mean distance of its points
 
-/// Uniform in [-1, 1): the finaliser of splitmix64 (Steele, Lea and Flood 2014), which turns a counter into random bits.
+/// Uniform in [-1, 1): the finaliser of splitmix64 (Steele, Lea and Flood 2014), which turns a counter into random
+/// bits.
 Real hash_to_unit(std::uint64_t counter) {
   std::uint64_t z = counter * 0x9e3779b97f4a7c15 + 0x9e3779b97f4a7c15;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;

@@ -17,7 +17,8 @@ std::string lower_extension(const std::filesystem::path& path);
 
 std::string lower_case(std::string_view text);
 
-/// `text` from a file fit for a one-line message: what is not printable ASCII replaced, all beyond `longest` characters cut.
+/// `text` from a file fit for a one-line message: what is not printable ASCII replaced, all beyond `longest` characters
+/// cut.
 std::string printable(std::string_view text, std::size_t longest = 40);
 
 /// The same between quotes.

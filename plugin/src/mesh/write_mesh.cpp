@@ -33,8 +33,7 @@ void add_scalars(std::string& text, std::span<const MeshScalars> fields, std::si
 // VTK gives the title one line of at most 256 characters.
 std::string title(const std::string& source) {
   std::string line = source.empty() ? "tetrahedral mesh" : source.substr(0, 250);
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' && c >= 0; }, ' ');
+  std::replace_if(line.begin(), line.end(), [](char c) { return c < ' ' && c >= 0; }, ' ');
   return line;
 }
 

@@ -1,13 +1,12 @@
 // One step of an island as many explicit substeps.
 #pragma once
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty {
 
-void advance_explicitly(std::span<SteppedBody* const> bodies, std::span<RigidBody> rigid_bodies, Real duration,
-                        std::span<Coupling* const> couplings);
+void advance_explicitly(Island& island, Real duration);
 
 /// Substeps that the stability limit asks for, at least 1.
-int wanted_substeps(std::span<SteppedBody* const> bodies, std::span<Coupling* const> couplings, Real duration);
+int wanted_substeps(const Island& island, Real duration);
 
 }  // namespace penalty

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "energy_guard.h"
 #include "stepped_body.h"
 
 namespace penalty {
@@ -39,8 +40,8 @@ struct RigidState {
     }
   }
 
-  /// The angular velocity of least energy with an angular momentum [rad/s]; about a line that all particles are on there is
-  /// none.
+  /// The angular velocity of least energy with an angular momentum [rad/s]; about a line that all particles are on
+  /// there is none.
   Vector3 angular_velocity(const Vector3& angular_momentum) const {
     const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(inertia);
     Vector3 turn = Vector3::Zero();
@@ -58,13 +59,13 @@ class ImplicitStep {
  public:
   ImplicitStep(SteppedBody& body, Real duration)
       : body_(body), particles_(body.particles), state_(body.implicit), newton_(state_.newton), duration_(duration) {
-    if (!newton_.has_pattern_of(*body.potential)) newton_.set_pattern(*body.potential, particles_.size());
+    if (!newton_.has_pattern_of(*body.field)) newton_.set_pattern(*body.field);
     newton_.clear_fixed();
     for (int i = 0; i < particles_.size(); ++i)
       if (particles_.inverse_masses[i] == 0) newton_.fix(i);
     newton_.linear = body.options.linear;
     Objective& objective = newton_.objective;
-    objective.potential = body.potential;
+    objective.field = body.field;
     objective.weights.resize(particles_.inverse_masses.size());
     for (std::size_t i = 0; i < objective.weights.size(); ++i)
       objective.weights[i] = inverse_or_zero(particles_.inverse_masses[i]) / (duration * duration);
@@ -74,8 +75,8 @@ class ImplicitStep {
 
   void run();
 
-  /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned particles from
-  /// all velocities.
+  /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned
+  /// particles from all velocities.
   void cap_energy(Real allowed);
 
  private:
@@ -103,7 +104,7 @@ void ImplicitStep::aim() {
     if (body_.external_forces.size() != 0) acceleration += inverse_mass * body_.external_forces.col(i).head<3>();
     objective.targets.col(i).head<3>() += duration_ * duration_ * acceleration;
   }
-  if (body_.options.damping_time > 0 || body_.potential->damps())
+  if (body_.options.damping_time > 0 || body_.field->damps())
     objective.damped_from = state_.from;
   else
     objective.damped_from.resize(4, 0);
@@ -172,6 +173,8 @@ void ImplicitStep::restore_momenta(const RigidState& before) {
     }
   const RigidState now(particles_);
   const Vector3 dv = (momentum - now.momentum) / now.mass, dw = now.angular_velocity(spin - now.spin);
+  body_.report.restored_momentum = (momentum - now.momentum).norm();
+  body_.report.restored_spin = (spin - now.spin).norm();
   for (int i = 0; i < particles_.size(); ++i) {
     const Vector3 arm = particles_.positions.col(i).head<3>() - now.center;
     particles_.velocities.col(i).head<3>() += dv + dw.cross(arm);
@@ -180,25 +183,27 @@ void ImplicitStep::restore_momenta(const RigidState& before) {
 }
 
 void ImplicitStep::cap_energy(Real allowed) {
+  body_.report.capped_energy = 0;
   const Real kinetic = kinetic_energy(particles_), excess = body_.elastic_energy + kinetic - allowed;
   if (!(excess > 0)) return;
-  if (!is_free()) {
+  if (is_free()) {
+    const RigidState rigid(particles_);
+    const Vector3 velocity = rigid.momentum / rigid.mass, turn = rigid.angular_velocity(rigid.spin);
+    const Real of_rigid = velocity.dot(rigid.momentum) / 2 + turn.dot(rigid.spin) / 2;
+    const Real of_deformation = kinetic - of_rigid;
+    if (!(of_deformation > 0)) return;
+    const Real share = std::sqrt(std::max<Real>(0, 1 - excess / of_deformation));
+    for (int i = 0; i < particles_.size(); ++i) {
+      const Vector3 as_rigid = velocity + turn.cross(Vector3(particles_.positions.col(i).head<3>() - rigid.center));
+      auto v = particles_.velocities.col(i).head<3>();
+      v = as_rigid + share * (v - as_rigid);
+    }
+  } else {
     const Real share = std::sqrt(std::max<Real>(0, 1 - excess / kinetic));
     for (int i = 0; i < particles_.size(); ++i)
       if (particles_.inverse_masses[i] > 0) particles_.velocities.col(i) *= share;
-    return;
   }
-  const RigidState rigid(particles_);
-  const Vector3 velocity = rigid.momentum / rigid.mass, turn = rigid.angular_velocity(rigid.spin);
-  const Real of_rigid = velocity.dot(rigid.momentum) / 2 + turn.dot(rigid.spin) / 2;
-  const Real of_deformation = kinetic - of_rigid;
-  if (!(of_deformation > 0)) return;
-  const Real share = std::sqrt(std::max<Real>(0, 1 - excess / of_deformation));
-  for (int i = 0; i < particles_.size(); ++i) {
-    const Vector3 as_rigid = velocity + turn.cross(Vector3(particles_.positions.col(i).head<3>() - rigid.center));
-    auto v = particles_.velocities.col(i).head<3>();
-    v = as_rigid + share * (v - as_rigid);
-  }
+  body_.report.capped_energy = kinetic - kinetic_energy(particles_);
 }
 
 void ImplicitStep::run() {
@@ -221,8 +226,8 @@ void ImplicitStep::run() {
     body_.step_flows.driving -= duration_ * newton_.forces().col(i).dot(particles_.velocities.col(i));
   if (body_.external_forces.size() != 0) body_.forces += body_.external_forces;
   body_.step_flows.damping += newton_.damping_work();
-  if (body_.potential->evolves()) {
-    const Real taken = body_.potential->evolve(particles_.positions, duration_);
+  if (body_.field->evolves()) {
+    const Real taken = body_.field->evolve(particles_.positions, duration_);
     body_.step_flows.inelastic += taken;
     if (taken != 0) evaluate_forces(body_);
   }
@@ -235,27 +240,29 @@ void advance_implicitly(SteppedBody& body, Real duration) {
   StepReport& report = body.report;
   report.integrator = Integrator::implicit_step;
   EnergyFlows& flows = body.step_flows;
-  Real end_energy = 0, allowed = 0;
-  bool finite = false;
-  for (int substeps = 1;; substeps *= 2, ++report.retries) {
-    report.substeps = substeps;
+  const auto attempt = [&](int substeps) {
+    flows = {};
     ImplicitStep step(body, duration / substeps);
     for (int k = 0; k < substeps; ++k) step.run();
     flows.constant_forces = constant_force_work(body);
-    allowed = start_energy + flows.received() - flows.lost();
+    const Real allowed = start_energy + flows.received() - flows.lost();
     // What drives pinned particles is known to the order of the step only.
-    if (flows.driving == 0) step.cap_energy(allowed);
-    end_energy = body.elastic_energy + kinetic_energy(body.particles);
-    finite = std::isfinite(end_energy);
-    const Real tolerance = flows.driving == 0 ? growth_noise : body.options.energy_tolerance;
-    if (finite && end_energy - allowed <= tolerance * std::max(start_energy, end_energy) + body.energy_noise) break;
-    if (substeps >= most_substeps || !std::isfinite(start_energy)) break;
-    undo_step(body);
-    flows = {};
-  }
-  report.finite = finite;
-  if (finite) {
-    flows.integration = allowed - end_energy;
+    const bool is_driven = flows.driving != 0;
+    if (!is_driven) step.cap_energy(allowed);
+    const Real end_energy = body.elastic_energy + kinetic_energy(body.particles);
+    const Real tolerance = is_driven ? body.options.energy_tolerance : growth_noise;
+    return Attempt{.substeps = substeps,
+                   .energy = end_energy,
+                   .allowed = allowed,
+                   .noise = tolerance * std::max(start_energy, end_energy) + body.energy_noise};
+  };
+  const GuardedStep step =
+      guard_energy(1, start_energy, {.most_substeps = most_substeps, .factor = 2}, attempt, [&] { undo_step(body); });
+  report.substeps = step.attempt.substeps;
+  report.retries = step.retries;
+  report.finite = step.finite;
+  if (step.finite) {
+    flows.integration = step.attempt.allowed - step.attempt.energy;
   } else {
     SteppedBody* bodies[] = {&body};
     name_bad_particles(bodies);
@@ -263,7 +270,7 @@ void advance_implicitly(SteppedBody& body, Real duration) {
     flows = {};
     body.implicit.has_acceleration = false;
   }
-  end_step(body, finite ? duration : 0);
+  end_step(body, step.finite ? duration : 0);
 }
 
 }  // namespace penalty

@@ -1,6 +1,6 @@
 // One step of one body by backward Euler.
 #pragma once
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty {
 

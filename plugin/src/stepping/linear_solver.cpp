@@ -48,14 +48,6 @@ void LinearSystem::clear_fixed(Forces v) const {
 void LinearSystem::multiply(const Vectors& x, Forces y) const {
   y.setZero();
   matrix.add_product(x, 1, y);
-  for (const RankOneTerm& term : terms) {
-    Real along = 0;
-    for (std::size_t k = 0; k < term.particles.size(); ++k)
-      along += term.direction.col(static_cast<Eigen::Index>(k)).dot(x.col(term.particles[k]).head<3>());
-    along *= term.coefficient;
-    for (std::size_t k = 0; k < term.particles.size(); ++k)
-      y.col(term.particles[k]).head<3>() += along * term.direction.col(static_cast<Eigen::Index>(k));
-  }
   clear_fixed(y);
 }
 
@@ -80,8 +72,8 @@ void LinearSolver::set_pattern(const BlockMatrix& matrix) {
 
 void LinearSolver::factorize(const LinearSystem& system, const Positions& x) {
   const int num_particles = system.matrix.num_particles();
-  for (int i = 0; i < num_particles; ++i) inverse_diagonal_[i] = system.matrix.diagonal(i);
-  for (const RankOneTerm& term : system.terms)
+  for (int i = 0; i < num_particles; ++i) inverse_diagonal_[i] = system.matrix.blocks().diagonal(i);
+  for (const RankOneTerm& term : system.matrix.terms())
     if (term.coefficient > 0)
       for (std::size_t k = 0; k < term.particles.size(); ++k) {
         const Vector3 d = term.direction.col(static_cast<Eigen::Index>(k));
@@ -100,8 +92,8 @@ void LinearSolver::factorize(const LinearSystem& system, const Positions& x) {
   factorize_coarse(system, x);
 }
 
-// The coarse matrix Zᵀ A Z, where column 6g + k of Z is the k-th rigid motion of group g: particle i, at r_i from its centre,
-// moves by t + w x r_i.
+// The coarse matrix Zᵀ A Z, where column 6g + k of Z is the k-th rigid motion of group g: particle i, at r_i from its
+// centre, moves by t + w x r_i.
 void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions& x) {
   const int groups = num_groups();
   if (groups == 0) return;
@@ -120,7 +112,7 @@ void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions&
     if (moves_[i] == 0) continue;
     const Matrix3 arm_i = cross_matrix(arms_.col(i).head<3>());
     const int row = 6 * group_of_[i];
-    system.matrix.visit_row(i, [&](int j, const Matrix3& block) {
+    system.matrix.blocks().visit_row(i, [&](int j, const Matrix3& block) {
       const int column = 6 * group_of_[j];
       if (column > row || moves_[j] == 0) return;
       const Matrix3 arm_j = cross_matrix(arms_.col(j).head<3>());
@@ -131,7 +123,7 @@ void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions&
       coarse_.block<3, 3>(row + 3, column + 3) -= arm_i * turned;
     });
   }
-  for (const RankOneTerm& term : system.terms) {
+  for (const RankOneTerm& term : system.matrix.terms()) {
     coarse_vector_.setZero();
     for (std::size_t k = 0; k < term.particles.size(); ++k) {
       const int i = term.particles[k], row = 6 * group_of_[i];

@@ -13,23 +13,26 @@ constexpr Real epsilon = 1e-16;
 
 }  // namespace
 
-void NewtonSolver::set_pattern(const Potential& potential, int num_particles) {
-  potential_ = &potential;
-  elements_ = potential.num_elements();
-  std::vector<std::pair<int, int>> pattern;
-  potential.append_pattern(pattern);
-  system_.matrix = BlockMatrix(num_particles, std::move(pattern));
-  damping_.matrix = system_.matrix;
-  solver_.set_pattern(system_.matrix);
+void NewtonSolver::set_pattern(const PotentialField& field) {
+  field_ = nullptr;  // until all of it is there
+  const int num_particles = field.num_particles();
+  system_.matrix = System::with_pattern(num_particles, [&](System& system) {
+    field.add_stiffness(field.rest_positions(), StiffnessModel::psd_projected, system);
+    field.add_damping(field.rest_positions(), 1, system);
+  });
+  damping_ = system_.matrix;
+  solver_.set_pattern(system_.matrix.blocks());
   for (PackedVectors* v : {&here_.positions, &here_.forces, &here_.gradient, &trial_.positions, &trial_.forces,
                            &trial_.gradient, &direction_, &displacement_, &damping_force_})
     v->setZero(4, num_particles);
+  num_elements_ = field.num_elements();
+  field_ = &field;
 }
 
 void NewtonSolver::evaluate(State& state) {
   const PackedVectors& x = state.positions;
   state.forces.setZero();
-  state.elastic_energy = objective.potential->add_forces(x, state.forces);
+  state.elastic_energy = objective.field->add_forces(x, state.forces);
   state.gradient = -state.forces;
   state.value = state.elastic_energy;
   state.magnitude = state.elastic_energy;
@@ -53,7 +56,8 @@ void NewtonSolver::evaluate(State& state) {
   state.damping = 0;
   if (objective.damped_from.size() != 0) {
     displacement_ = x - objective.damped_from;
-    damping_.multiply(displacement_, damping_force_);
+    damping_force_.setZero();
+    damping_.add_product(displacement_, 1, damping_force_);
     state.damping = displacement_.cwiseProduct(damping_force_).sum() / 2;
     state.gradient += damping_force_;
     state.value += state.damping;
@@ -64,13 +68,9 @@ void NewtonSolver::evaluate(State& state) {
 
 void NewtonSolver::prepare() {
   if (objective.damped_from.size() != 0) {
-    damping_.matrix.set_zero();
-    damping_.terms.clear();
-    const Real time = objective.damping_time;
-    objective.potential->add_damping(objective.damped_from, time, damping_.matrix);
-    objective.potential->append_damping_terms(objective.damped_from, time, damping_.terms);
-    damping_.matrix.scale(objective.inverse_duration);
-    for (RankOneTerm& term : damping_.terms) term.coefficient *= objective.inverse_duration;
+    damping_.set_zero();
+    objective.field->add_damping(objective.damped_from, objective.damping_time, damping_);
+    damping_.scale(objective.inverse_duration);
   }
 }
 
@@ -86,18 +86,13 @@ void NewtonSolver::offer(const PackedVectors& x) {
 }
 
 void NewtonSolver::assemble() {
-  BlockMatrix& matrix = system_.matrix;
+  System& matrix = system_.matrix;
   matrix.set_zero();
-  system_.terms.clear();
-  objective.potential->add_stiffness(here_.positions, StiffnessModel::psd_projected, matrix);
-  objective.potential->append_rank_one_terms(here_.positions, StiffnessModel::psd_projected, system_.terms);
-  if (objective.damped_from.size() != 0) {
-    matrix.add(damping_.matrix, 1);
-    system_.terms.insert(system_.terms.end(), damping_.terms.begin(), damping_.terms.end());
-  }
+  objective.field->add_stiffness(here_.positions, StiffnessModel::psd_projected, matrix);
+  if (objective.damped_from.size() != 0) matrix.add(damping_);
   const int num_particles = matrix.num_particles();
   Real stiffness = 0;
-  for (int i = 0; i < num_particles; ++i) stiffness += matrix.diagonal(i).trace() / 3;
+  for (int i = 0; i < num_particles; ++i) stiffness += matrix.blocks().diagonal(i).trace() / 3;
   const Real shift = regularization * stiffness / std::max(num_particles, 1);
   // A turned body has F far from 1, and energies of elements that are small differences of large numbers.
   const auto x = here_.positions.topRows<3>();

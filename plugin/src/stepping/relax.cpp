@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "penalty/math/affine_span.h"
+#include "penalty/stepping/newton.h"
 
 namespace penalty {
 namespace {
@@ -31,10 +32,7 @@ void check(const PotentialField& field, const PackedVectors& positions, const Re
   if (options.max_iterations < 0)
     fail("max_iterations is " + std::to_string(options.max_iterations) + ", must be zero or positive");
   if (!(options.tolerance > 0)) fail("tolerance is " + to_text(options.tolerance) + ", must be positive");
-  if (options.linear.max_iterations < 1)
-    fail("linear.max_iterations is " + std::to_string(options.linear.max_iterations) + ", must be at least 1");
-  if (!(options.linear.tolerance > 0 && options.linear.tolerance < 1))
-    fail("linear.tolerance is " + to_text(options.linear.tolerance) + ", must be in (0, 1)");
+  options.linear.check("relax");
 }
 
 }  // namespace
@@ -73,9 +71,9 @@ RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOp
   }
 
   NewtonSolver newton;
-  newton.set_pattern(field, field.num_particles());
+  newton.set_pattern(field);
   for (const int i : pinned) newton.fix(i);
-  newton.objective.potential = &field;
+  newton.objective.field = &field;
   newton.objective.loads = options.loads;
   newton.linear = options.linear;
   newton.regularization = regularization;

@@ -26,16 +26,16 @@ Eigen::VectorXd start_vector(Eigen::Index size) {
 
 }  // namespace
 
-Real gershgorin_bound(const Potential& potential, const Positions& x, std::span<const Real> inverse_masses) {
+Real gershgorin_bound(const PotentialField& field, const Positions& x, std::span<const Real> inverse_masses) {
   std::vector<Real> bounds(inverse_masses.size(), 0);
-  potential.add_stiffness_bounds(x, bounds);
+  field.add_bounds(x, bounds);
   Real largest = 0;
   for (std::size_t i = 0; i < bounds.size(); ++i) largest = std::max(largest, bounds[i] * inverse_masses[i]);
   return largest;
 }
 
-Real largest_eigenvalue_bound(const Potential& potential, const Positions& x, std::span<const Real> inverse_masses) {
-  const Real ceiling = gershgorin_bound(potential, x, inverse_masses);
+Real largest_eigenvalue_bound(const PotentialField& field, const Positions& x, std::span<const Real> inverse_masses) {
+  const Real ceiling = gershgorin_bound(field, x, inverse_masses);
   const auto num_particles = static_cast<Eigen::Index>(inverse_masses.size());
   if (!(ceiling > 0)) return ceiling;
 
@@ -46,7 +46,7 @@ Real largest_eigenvalue_bound(const Potential& potential, const Positions& x, st
   const auto apply = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     in.topRows<3>() = (v.array() * scale).matrix().reshaped(3, num_particles);
     out.setZero();
-    potential.add_stiffness_product(x, StiffnessModel::taut, in, 1, out);
+    field.add_product(x, StiffnessModel::taut, in, 1, out);
     return (out.topRows<3>().reshaped().array() * scale).matrix();
   };
 

@@ -27,7 +27,7 @@ void evaluate_forces(SteppedBody& body) {
     body.forces.setZero(4, body.particles.size());
   else
     body.forces = body.external_forces;
-  body.elastic_energy = body.potential->add_forces(body.particles.positions, body.forces);
+  body.elastic_energy = body.field->add_forces(body.particles.positions, body.forces);
   body.forces_valid = true;
 }
 
@@ -39,15 +39,14 @@ Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Re
 
 Real begin_step(SteppedBody& body) {
   body.report = {};
-  body.report.unfolded = body.options.unfold && unfold(body.particles.positions, body.rest_positions, body.rest_span,
-                                                       body.particles.inverse_masses);
+  body.report.unfolded = body.options.unfold && unfold(body.particles.positions, body.field->rest_positions(),
+                                                       body.rest_span, body.particles.inverse_masses);
   if (body.report.unfolded) body.positions_changed();
-  if (body.potential->choose_phase(body.particles.positions) != 0) body.positions_changed();
+  if (body.field->choose_phase(body.particles.positions) != 0) body.positions_changed();
   body.start.positions = body.particles.positions;
   body.start.velocities = body.particles.velocities;
-  body.potential->save_state();
+  body.field->get_state(body.start_state);
   if (!body.forces_valid) evaluate_forces(body);
-  body.report.num_contacts = static_cast<int>(body.contacts.size());
   body.step_flows = {};
   const Real energy = body.elastic_energy + kinetic_energy(body.particles);
   if (body.last_energy && std::isfinite(energy - *body.last_energy)) body.flows.changes += energy - *body.last_energy;
@@ -58,8 +57,7 @@ Real begin_step(SteppedBody& body) {
 void undo_step(SteppedBody& body) {
   body.particles.positions = body.start.positions;
   body.particles.velocities = body.start.velocities;
-  for (Contact& contact : body.contacts) contact.depth = 0;
-  body.potential->restore_state();
+  body.field->set_state(body.start_state);
   evaluate_forces(body);
 }
 
@@ -99,15 +97,15 @@ void name_bad_particles(std::span<SteppedBody* const> bodies) {
   for (SteppedBody* body : bodies) body->report.first_bad_particle = fastest(body->start);
 }
 
-void estimate_stability(SteppedBody& body, const Positions& rest_positions) {
-  body.largest_eigenvalue = largest_eigenvalue_bound(*body.potential, rest_positions, body.particles.inverse_masses);
+void estimate_stability(SteppedBody& body) {
+  const PackedVectors& rest = body.field->rest_positions();
+  body.largest_eigenvalue = largest_eigenvalue_bound(*body.field, rest, body.particles.inverse_masses);
   body.mass = 0;
   for (const Real inverse_mass : body.particles.inverse_masses) body.mass += inverse_or_zero(inverse_mass);
-  const auto points = rest_positions.topRows<3>();
+  const auto points = rest.topRows<3>();
   const Real extent2 =
       points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
-  body.rest_positions = rest_positions;
-  body.rest_span = affine_span(rest_positions);
+  body.rest_span = affine_span(rest);
   body.energy_noise = 1e-15 * body.mass * body.largest_eigenvalue * extent2;
 }
 

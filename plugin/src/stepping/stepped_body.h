@@ -1,6 +1,6 @@
 // What both integrators do with a body.
 #pragma once
-#include "penalty/stepping/step.h"
+#include "penalty/stepping/island.h"
 
 namespace penalty {
 
@@ -12,7 +12,8 @@ void evaluate_forces(SteppedBody& body);
 /// Half the work that an impulse on a particle shares with the kick of the body's own forces [J].
 Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Real kick_time);
 
-/// Keeps the state to go back to, and books what changed since the last step. Returns kinetic + elastic energy [J].
+/// Unfolds it, chooses its phase, keeps the state to go back to, and books what changed since the last step. Returns
+/// kinetic + elastic energy [J].
 Real begin_step(SteppedBody& body);
 
 /// Goes back to the state that `begin_step` kept.
@@ -24,8 +25,8 @@ void end_step(SteppedBody& body, Real duration);
 /// Work of gravity and external forces since the start of the step [J].
 Real constant_force_work(const SteppedBody& body);
 
-/// Names the particle to look at after a step that could not be made finite, in the state that it started from: one that is
-/// not finite itself; if there is none in the island, the fastest of each body.
+/// Names the particle to look at after a step that could not be made finite, in the state that it started from: one
+/// that is not finite itself; if there is none in the island, the fastest of each body.
 void name_bad_particles(std::span<SteppedBody* const> bodies);
 
 }  // namespace penalty

@@ -4,8 +4,10 @@
 #include <memory>
 #include <vector>
 
-#include "penalty/fields/potential_field.h"
-#include "penalty/stepping/step.h"
+#include "penalty/contact/weighted_point.h"
+#include "penalty/fields/ledger.h"
+#include "penalty/stepping/particles.h"
+#include "penalty/stepping/step_report.h"
 
 class btRigidBody;
 class btSoftBody;
@@ -17,22 +19,29 @@ class HeldBodies;
 struct AttachOptions {
   StepOptions step;
   /// Where the body may touch rigid bodies; empty: every node. Weighted points follow an embedded surface.
-  std::vector<ContactPoint> contact_points = {};
+  std::vector<WeightedPoint> contact_points = {};
 };
 
-/// A point that a coupling holds: a node of an attached soft body, or a point fixed in a rigid body.
+/// A point that a coupling holds: a node of an attached soft body, a point between its nodes, or one fixed in a rigid
+/// body.
 struct CouplingPoint {
   const btSoftBody* soft_body = nullptr;
-  int node = -1;
+  WeightedPoint point = {};  // of the soft body
   btRigidBody* rigid_body = nullptr;
   Vector3 anchor = Vector3::Zero();  // in the frame of the rigid body [m]
 
-  static CouplingPoint at_node(const btSoftBody& body, int node) { return {.soft_body = &body, .node = node}; }
+  static CouplingPoint at_node(const btSoftBody& body, int node) {
+    return {.soft_body = &body, .point = WeightedPoint::at_particle(node)};
+  }
+  /// A point of a face, or of an embedded surface.
+  static CouplingPoint between(const btSoftBody& body, const WeightedPoint& point) {
+    return {.soft_body = &body, .point = point};
+  }
   static CouplingPoint on(btRigidBody& body, const Vector3& anchor) { return {.rigid_body = &body, .anchor = anchor}; }
 };
 
-/// The name of an attached body: a value to keep or to drop, which changes nothing for the body. It stays good when body and
-/// solver are deleted, in whatever order.
+/// The name of an attached body: a value to keep or to drop, which changes nothing for the body. It stays good when
+/// body and solver are deleted, in whatever order.
 class AttachedBody {
  public:
   AttachedBody(const std::shared_ptr<const HeldBodies>& solver, const btSoftBody& body, std::uintptr_t serial_number)
@@ -41,8 +50,8 @@ class AttachedBody {
   /// Carried by this body and no other, whatever memory it lies in.
   std::uintptr_t serial_number() const { return serial_number_; }
 
-  /// Whether the solver steps the body no more. After `detach` at once, after deletion or removal from the world from the
-  /// next world step on; a body that is put back is there again.
+  /// Whether the solver steps the body no more. After `detach` at once, after deletion or removal from the world from
+  /// the next world step on; a body that is put back is there again.
   bool is_gone() const;
 
  private:
@@ -58,8 +67,8 @@ class AttachedBody {
 /// btSoftBody::addForce, pinning through setMass) takes effect, and a world in single precision still carries a
 /// simulation in double.
 ///
-/// A body is known by a serial number that it carries, not by its address: it may be deleted, or removed from the world,
-/// without `detach`, and so may bodies that are coupled. What remains of it here is never followed.
+/// A body is known by a serial number that it carries, not by its address: it may be deleted, or removed from the
+/// world, without `detach`, and so may bodies that are coupled. What remains of it here is never followed.
 ///
 /// A step never throws. A body that cannot be stepped stays where it is, and StepReport::problem says why: nodes were
 /// appended, a rigid body that it is coupled to has left the world, a constraint of the user threw, a setting or the
@@ -71,20 +80,21 @@ class AttachedBodies {
   AttachedBodies(const AttachedBodies&) = delete;
   AttachedBodies& operator=(const AttachedBodies&) = delete;
 
-  /// Takes over a soft body that is, or will be, in the world of this solver. A further field for the same body is added to the
-  /// first, options then being those of the last call. Throws std::invalid_argument if the field has another number of
-  /// particles than the body has nodes, if a node's position, velocity or inverse mass is out of range, if another number
-  /// is, or if the body's world info has no broadphase. The result may be dropped.
+  /// Takes over a soft body that is, or will be, in the world of this solver. A further field for the same body is
+  /// added to the first, options then being those of the last call. Throws std::invalid_argument if the field has
+  /// another number of particles than the body has nodes, if a node's position, velocity or inverse mass is out of
+  /// range, if another number is, or if the body's world info has no broadphase. The result may be dropped.
   AttachedBody attach(btSoftBody& body, PotentialField field, const AttachOptions& options = {});
 
-  /// Gives the body back to Bullet, and lets those that it is coupled to wake in the next step. Detaching a body that is not
-  /// attached does nothing. A deleted body need not be detached; its memory here is given back when another body stands at its
-  /// address, or with the solver.
+  /// Gives the body back to Bullet, and lets those that it is coupled to wake in the next step. Detaching a body that
+  /// is not attached does nothing. A deleted body need not be detached; its memory here is given back when another body
+  /// stands at its address, or with the solver.
   void detach(const btSoftBody& body);
 
   bool is_attached(const btSoftBody& body) const;
 
-  /// State at the end of the last step, in double: node i is column i. Throws std::invalid_argument for a body that is not attached.
+  /// State at the end of the last step, in double: node i is column i. Throws std::invalid_argument for a body that is
+  /// not attached.
   const Particles& particles(const btSoftBody& body) const;
   const PotentialField& field(const btSoftBody& body) const;
   const StepReport& report(const btSoftBody& body) const;
@@ -98,8 +108,8 @@ class AttachedBodies {
   /// Elastic forces on the nodes at the present positions, those of couplings left out: column i on node i [N].
   PackedVectors forces(const btSoftBody& body) const;
 
-  /// The field, for changes: targets, stiffnesses, elements switched off. Wakes the body; call it anew for each change. The
-  /// field is to be changed, not to be assigned to.
+  /// The field, for changes: targets, stiffnesses, elements switched off. Wakes the body; call it anew for each change.
+  /// The field is to be changed, not to be assigned to.
   PotentialField& edit(const btSoftBody& body);
 
   /// Adds a potential over points of several bodies of this solver: particle i of the field is points[i], its rest
@@ -108,8 +118,9 @@ class AttachedBodies {
   /// appears twice, no soft body at all, or another number of points than the field has particles.
   int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time = 0);
 
-  /// Removes a coupling; its bodies wake in the next step. Detaching a soft body does it by itself. While a rigid body of the
-  /// coupling is not in the world, its soft bodies cannot be stepped; while a soft one is not, the coupling rests.
+  /// Removes a coupling; its bodies wake in the next step. Detaching a soft body does it by itself. While a rigid body
+  /// of the coupling is not in the world, its soft bodies cannot be stepped; while a soft one is not, the coupling
+  /// rests.
   void uncouple(int coupling);
   const PotentialField& coupling_field(int coupling) const;
   PotentialField& edit_coupling(int coupling);  // its bodies wake in the next step
@@ -118,7 +129,8 @@ class AttachedBodies {
   /// The substep count is estimated anew at the next step: call after a change of masses or of the field.
   void refresh(const btSoftBody& body);
 
-  /// Reads what the application changed since the last step now rather than at the next step, so that `particles` shows it.
+  /// Reads what the application changed since the last step now rather than at the next step, so that `particles` shows
+  /// it.
   void synchronize(const btSoftBody& body);
 
  protected:

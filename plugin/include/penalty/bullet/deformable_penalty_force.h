@@ -16,18 +16,18 @@ namespace penalty {
 ///     force.attach(*body, std::move(field));
 ///     world.addForce(body, &force);
 ///
-/// The stock solver evaluates it once a step, so a stiff field needs a small time step in explicit mode; in implicit mode
-/// (`setImplicit(true)`, which also wants `setUseProjection(true)` and a registered gravity force) the stiffness is
-/// Gauss-Newton's. Contact of a stiff body stays as unstable as under Bullet's own forces, and momentum is not
-/// exchanged exactly with rigid bodies, and nothing flows or breaks: PenaltyDeformableBodySolver has none of these limits. Every object has a force type of
-/// its own, so Bullet never merges two of them. The world does not own the force: remove the
-/// bodies from the world before the force goes. A deleted body need not be detached.
+/// The stock solver evaluates it once a step, so a stiff field needs a small time step in explicit mode; in implicit
+/// mode (`setImplicit(true)`, which also wants `setUseProjection(true)` and a registered gravity force) the stiffness
+/// is Gauss-Newton's. Contact of a stiff body stays as unstable as under Bullet's own forces, and momentum is not
+/// exchanged exactly with rigid bodies, and nothing flows or breaks: PenaltyDeformableBodySolver has none of these
+/// limits. Every object has a force type of its own, so Bullet never merges two of them. The world does not own the
+/// force: remove the bodies from the world before the force goes. A deleted body need not be detached.
 ///
 /// What Bullet calls never throws: on a body of which forces cannot be had, none acts, and `problem` says why.
 class DeformablePenaltyForce final : public btDeformableLagrangianForce {
  public:
-  /// `damping_time`: ratio of damping to stiffness along the constraint gradients [s]. Throws std::invalid_argument if it is
-  /// negative or not finite.
+  /// `damping_time`: ratio of damping to stiffness along the constraint gradients [s]. Throws std::invalid_argument if
+  /// it is negative or not finite.
   explicit DeformablePenaltyForce(Real damping_time = 0);
   ~DeformablePenaltyForce() override;
 
@@ -35,12 +35,12 @@ class DeformablePenaltyForce final : public btDeformableLagrangianForce {
   void attach(btSoftBody& body, PotentialField field);
   void detach(const btSoftBody& body);
 
-  /// What kept forces from the body in the last step, on one line; empty: nothing. Throws std::invalid_argument for a body that
-  /// is not attached.
+  /// What kept forces from the body in the last step, on one line; empty: nothing. Throws std::invalid_argument for a
+  /// body that is not attached.
   std::string problem(const btSoftBody& body) const;
 
-  // Forces of all attached bodies that were also added through world.addForce, at the trial positions m_q. Arrays are indexed
-  // by Node::index and may be longer than the number of nodes.
+  // Forces of all attached bodies that were also added through world.addForce, at the trial positions m_q. Arrays are
+  // indexed by Node::index and may be longer than the number of nodes.
   void addScaledForces(btScalar scale, TVStack& force) override;
   void addScaledExplicitForce(btScalar scale, TVStack& force) override;
   void addScaledDampingForce(btScalar scale, TVStack& force) override;

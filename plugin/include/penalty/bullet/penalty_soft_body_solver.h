@@ -14,9 +14,9 @@ namespace penalty {
 ///     world.addSoftBody(body);
 ///     solver.attach(*body, std::move(field));
 ///
-/// Attached bodies are stepped whole in `predictMotion`: contact with rigid bodies included, so Bullet's own contact for
-/// them is switched off. All other soft bodies behave as under Bullet's default solver. Gravity is that of the body's
-/// world info, not of the world. The solver outlives the world.
+/// Attached bodies are stepped whole in `predictMotion`: contact with rigid bodies included, so Bullet's own contact
+/// for them is switched off. All other soft bodies behave as under Bullet's default solver. Gravity is that of the
+/// body's world info, not of the world. The solver outlives the world.
 class PenaltySoftBodySolver : public btDefaultSoftBodySolver, public AttachedBodies {
  public:
   PenaltySoftBodySolver();

@@ -19,19 +19,20 @@ struct SoftBodyOptions {
   std::vector<int> pinned = {};  // nodes of zero inverse mass
   Real margin = 0.02;            // collision margin [m]
   Real friction = 0.5;           // Coulomb coefficient, multiplied with that of the other body
-  /// For Bullet's own solver of the deformable world: its collision flags, and links along the edges, without which Bullet's
-  /// trees are never finished. The plugin's solvers need neither.
+  /// For Bullet's own solver of the deformable world: its collision flags, and links along the edges, without which
+  /// Bullet's trees are never finished. The plugin's solvers need neither.
   bool stock_deformable = false;
 };
 
 /// A Bullet soft body whose node i is vertex i of the mesh and whose faces are the boundary of the mesh. It holds no
-/// tetrahedra of Bullet's, and links only on request: these cost time in every step, and the field replaces them. `mesh.vertices` give the
-/// start positions. Throws std::invalid_argument that names the option, index and value.
+/// tetrahedra of Bullet's, and links only on request: these cost time in every step, and the field replaces them.
+/// `mesh.vertices` give the start positions. Throws std::invalid_argument that names the option, index and value.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
                                            const SoftBodyOptions& options = {});
 
-/// Its mass is the density of the material times the volume of the mesh as it is now: make the body from the rest shape, and
-/// move it then. `options.mass` is another answer to the same question, and refused. Stiffness is the field's business.
+/// Its mass is the density of the material times the volume of the mesh as it is now: make the body from the rest
+/// shape, and move it then. `options.mass` is another answer to the same question, and refused. Stiffness is the
+/// field's business.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
                                            const Material& material, const SoftBodyOptions& options = {});
 
@@ -39,7 +40,8 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
                                            const SoftBodyOptions& options = {});
 
-/// Its mass is the density of the material times area times `thickness` [m]; what a closed surface encloses weighs nothing.
+/// Its mass is the density of the material times area times `thickness` [m]; what a closed surface encloses weighs
+/// nothing.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
                                            const Material& material, Real thickness,
                                            const SoftBodyOptions& options = {});

@@ -16,15 +16,15 @@ enum class ElasticModel {
 
 /// An isotropic elastic material.
 ///
-/// Averaged over directions, springs with K = Y v_e (v_e the rest volume that the edge stands for) have the Lamé parameters
-/// mu = lambda = Y/15, areas with K = Y v_f have mu = Y/15 and lambda = 6Y/15, and volumes with K = kappa V_t add kappa to
-/// lambda. With a share a of the shear modulus in the areas this gives
+/// Averaged over directions, springs with K = Y v_e (v_e the rest volume that the edge stands for) have the Lamé
+/// parameters mu = lambda = Y/15, areas with K = Y v_f have mu = Y/15 and lambda = 6Y/15, and volumes with K = kappa
+/// V_t add kappa to lambda. With a share a of the shear modulus in the areas this gives
 ///
 ///     K_length = 15 (1 - a) mu v_e,   K_area = 15 a mu v_f,   K_volume = (lambda - (1 + 5a) mu) V_t;
 ///
-/// all scale with the volume of the element, so that refining the mesh keeps the stiffness of the body. The springs alone
-/// already have Poisson ratio 1/4, and areas more, which is the least that each model can express. The average is over
-/// all directions alike: on a mesh that prefers some, the body is stiffer than it says by some per cent; the
+/// all scale with the volume of the element, so that refining the mesh keeps the stiffness of the body. The springs
+/// alone already have Poisson ratio 1/4, and areas more, which is the least that each model can express. The average is
+/// over all directions alike: on a mesh that prefers some, the body is stiffer than it says by some per cent; the
 /// neo-Hookean model is not.
 struct Material {
   Real young = 1e5;     // E [Pa]

@@ -11,8 +11,8 @@
 
 namespace penalty {
 
-/// Which part of C is resisted: E = K/2 s² with the strain s = d - clamp(d, lower, upper), d = C - target. In between, the
-/// element is slack: no force. `lower == upper == 0`, the default, resists everything.
+/// Which part of C is resisted: E = K/2 s² with the strain s = d - clamp(d, lower, upper), d = C - target. In between,
+/// the element is slack: no force. `lower == upper == 0`, the default, resists everything.
 ///
 ///     s |         /          target    the C that counts as rest: muscles, inflation, plastic flow
 ///       |        /           (-inf, 0) only stretching is resisted: a rope
@@ -36,15 +36,15 @@ struct Profile {
 
 inline constexpr Real infinite = std::numeric_limits<Real>::infinity();
 
-/// Plastic flow (Müller and Gross 2004; Teschner et al. 2004): while |s| exceeds `yield`, the target follows C at the rate
-/// `creep` s until the plastic part of the target reaches `limit`. All three in units of C.
+/// Plastic flow (Müller and Gross 2004; Teschner et al. 2004): while |s| exceeds `yield`, the target follows C at the
+/// rate `creep` s until the plastic part of the target reaches `limit`. All three in units of C.
 struct Plasticity {
   Real yield = infinite;  // strain that is still elastic
   Real creep = infinite;  // [1/s]; infinite: at once down to the yield strain
   Real limit = infinite;  // largest plastic strain
 
-  /// The plastic strain after `duration` [s] at strain `s` and unchanged C. Exact, so that any duration is stable: s decays as
-  /// exp(-creep t) until it has come down to the yield strain.
+  /// The plastic strain after `duration` [s] at strain `s` and unchanged C. Exact, so that any duration is stable: s
+  /// decays as exp(-creep t) until it has come down to the yield strain.
   Real flow(Real plastic, Real s, Real duration) const {
     const Real magnitude = std::abs(s);
     if (!(magnitude > yield)) return plastic;

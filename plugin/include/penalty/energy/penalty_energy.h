@@ -8,11 +8,6 @@
 
 namespace penalty {
 
-/// What elements are made of: a constraint C with E = K/2 s(C)², or an energy of its own, E = K psi. For the latter C
-/// stands for sqrt(2 psi), so that profiles mean the same.
-template <class Kind>
-concept ElementKind = Constraint<Kind> || ElasticEnergy<Kind>;
-
 enum class StiffnessModel {
   gauss_newton,   // K dC dCᵀ: positive semidefinite, exact where s = 0; of an energy: psd_projected
   exact,          // K (dC dCᵀ + s d²C): the second derivative of E; indefinite away from rest
@@ -38,8 +33,8 @@ Real energy(const Kind& kind, Real stiffness, const Points<Kind::num_points>& po
   return stiffness / 2 * s * s;
 }
 
-/// E [J], and dE/dp into `gradient`, which is overwritten [N]: K s dC/dp (seed eq. 2 and 8; eq. 13 and 20 for lengths and
-/// volumes); of an energy K (s / C) dpsi/dp.
+/// E [J], and dE/dp into `gradient`, which is overwritten [N]: K s dC/dp (seed eq. 2 and 8; eq. 13 and 20 for lengths
+/// and volumes); of an energy K (s / C) dpsi/dp.
 template <ElementKind Kind>
 Real energy_and_gradient(const Kind& kind, Real stiffness, const Points<Kind::num_points>& points,
                          const Profile& profile, Gradient<Kind::num_points>& gradient) {
@@ -118,25 +113,8 @@ Hessian<Kind::num_points> stiffness_matrix(const Kind& kind, Real stiffness, con
   return project ? psd_projection(k) : k;
 }
 
-/// An energy may damp along modes of its own: `visit_damping_modes(p, visit)` calls visit(weight, gradient) for each, and
-/// the damping matrix is the sum of d weight g gᵀ. The one mode of a constraint is dC, that of any other energy also.
-template <class Kind>
-concept HasDampingModes = ElasticEnergy<Kind> && requires(const Kind kind, const Points<Kind::num_points>& p) {
-  kind.visit_damping_modes(p, [](Real, const Gradient<Kind::num_points>&) {});
-};
-
-/// Or all motion but the rigid one: `damping_force(p, v, d)` of the group, and `damp(p, inverse_masses, d * duration, v)`,
-/// its implicit step.
-template <class Kind>
-concept HasRigidDamping = ElasticEnergy<Kind> &&
-    requires(const Kind kind, const Points<Kind::num_points>& p, Points<Kind::num_points>& v,
-             std::vector<Real> inverse_masses) {
-  { kind.damping_force(p, v, Real()) } -> std::convertible_to<Gradient<Kind::num_points>>;
-  kind.damp(p, inverse_masses, Real(), v);
-};
-
-/// Damping along the gradient, F_i = -d (dC/dt) dC/dp_i with dC/dt = sum_j dC/dp_j . v_j [N]: it opposes only the motion
-/// that changes C, so it has no net force and no net torque. `damping` d in joule seconds.
+/// Damping along the gradient, F_i = -d (dC/dt) dC/dp_i with dC/dt = sum_j dC/dp_j . v_j [N]: it opposes only the
+/// motion that changes C, so it has no net force and no net torque. `damping` d in joule seconds.
 template <ElementKind Kind>
 Gradient<Kind::num_points> damping_force(const Kind& kind, Real damping, const Points<Kind::num_points>& points,
                                          const Points<Kind::num_points>& velocities) {

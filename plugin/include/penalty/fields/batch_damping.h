@@ -1,16 +1,8 @@
-// The damping of a batch: part of batch.h.
+// The damping of a batch: part of batch_loops.h.
 #pragma once
-#include "penalty/fields/batch.h"
+#include "penalty/fields/batch_loops.h"
 
 namespace penalty {
-
-template <ElementKind Kind>
-void Batch<Kind>::add_damping_forces(const Positions& x, const Vectors& v, Real time, Forces f) const {
-  for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
-    gather(e, v, s.vectors);
-    scatter(e, damping_force(kinds_[e], damping, s.points, s.vectors), 1, f);
-  });
-}
 
 template <ElementKind Kind>
 template <class Visit>
@@ -27,46 +19,34 @@ void Batch<Kind>::visit_damping_modes(std::size_t e, Scratch& s, const Visit& vi
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::add_damping(const Positions& x, Real time, BlockMatrix& matrix) const {
-  for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
+void Batch<Kind>::add_damping(const Positions& x, Real time, System& system) const {
+  if (system.is_counting()) return count(system);
+  for_each_damped(x, time, 1, [&](std::size_t e, auto& s, Real damping) {
     const Stencil& stencil = stencils_[e];
+    const auto add_term = [&](Real weight, const Gradient<num_points>& mode) {
+      system.add_term(damping * weight, stencil, mode);
+    };
     if constexpr (HasRigidDamping<Kind>) {
       kinds_[e].visit_damping(
           s.points,
-          [&](int i, Real value) { matrix.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value)); },
-          [](Real, const Gradient<num_points>&) {});
-    } else if constexpr (num_points != dynamic) {
+          [&](int i, Real value) { system.add_block(stencil[i], stencil[i], Matrix3::Identity() * (damping * value)); },
+          add_term);
+    } else if constexpr (num_points == dynamic) {
+      visit_damping_modes(e, s, add_term);
+    } else {
       Hessian<num_points> d = Hessian<num_points>::Zero();
       visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& mode) {
         d.noalias() += (damping * weight) * mode.reshaped() * mode.reshaped().transpose();
       });
-      for (int i = 0; i < num_points; ++i)
-        for (int j = 0; j < num_points; ++j)
-          matrix.add_block(stencil[i], stencil[j], d.template block<3, 3>(3 * i, 3 * j));
+      system.add_dense(stencil, d);
     }
   });
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::append_damping_terms(const Positions& x, Real time, std::vector<RankOneTerm>& terms) const {
-  if constexpr (num_points == dynamic)
-    for_each_damped(x, time, [&](std::size_t e, auto& s, Real damping) {
-      const auto append = [&](Real weight, const Gradient<num_points>& mode) {
-        terms.push_back({damping * weight, stencils_[e], mode});
-      };
-      if constexpr (HasRigidDamping<Kind>)
-        kinds_[e].visit_damping(
-            s.points, [](int, Real) {}, append);
-      else
-        visit_damping_modes(e, s, append);
-    });
-}
-
-template <ElementKind Kind>
 void Batch<Kind>::dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
                             Forces v) const {
-  for_each_damped(x, time, [&](std::size_t e, auto& s, Real coefficient) {
-    const Real damping = coefficient * duration;
+  for_each_damped(x, time, duration, [&](std::size_t e, auto& s, Real damping) {
     const Stencil& stencil = stencils_[e];
     if constexpr (HasRigidDamping<Kind>) {
       for (std::size_t k = 0; k < stencil.size(); ++k) s.inverse_masses[k] = inverse_masses[stencil[k]];

@@ -1,6 +1,6 @@
-// The second derivatives of a batch: part of batch.h.
+// The second derivatives of a batch: part of batch_loops.h.
 #pragma once
-#include "penalty/fields/batch.h"
+#include "penalty/fields/batch_loops.h"
 
 namespace penalty {
 
@@ -40,53 +40,36 @@ void Batch<Kind>::visit_structured(std::size_t e, Scratch& s, StiffnessModel mod
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::add_stiffness(const Positions& x, StiffnessModel model, BlockMatrix& stiffness) const {
+void Batch<Kind>::count(System& system) const {
+  for (std::size_t e = 0; e < stencils_.size(); ++e) {
+    const Stencil& stencil = stencils_[e];
+    if constexpr (!is_structured)
+      system.count_dense(stencil);
+    else if constexpr (HasSparseHessian<Kind>)
+      kinds_[e].visit_hessian_pattern([&](int i, int j) { system.count(stencil[i], stencil[j]); });
+    // The diagonal is in every pattern.
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_stiffness(const Positions& x, StiffnessModel model, System& system) const {
+  if (system.is_counting()) return count(system);
   for_each_enabled(x, [&](std::size_t e, auto& s) {
     const Stencil& stencil = stencils_[e];
     if constexpr (is_structured) {
       visit_structured(
-          e, s, model, [&](int i, int j, const Matrix3& block) { stiffness.add_block(stencil[i], stencil[j], block); },
-          [](Real, const Gradient<num_points>&) {});
+          e, s, model, [&](int i, int j, const Matrix3& block) { system.add_block(stencil[i], stencil[j], block); },
+          [&](Real coefficient, const Gradient<num_points>& mode) { system.add_term(coefficient, stencil, mode); });
     } else {
       const Hessian<num_points> k = stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e));
-      const int n = static_cast<int>(stencil.size());
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) stiffness.add_block(stencil[i], stencil[j], k.template block<3, 3>(3 * i, 3 * j));
+      system.add_dense(stencil, k);
     }
   });
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::append_pattern(std::vector<std::pair<int, int>>& pattern) const {
-  for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      if constexpr (HasSparseHessian<Kind>)
-        kinds_[e].visit_hessian_pattern([&](int i, int j) { pattern.emplace_back(stencil[i], stencil[j]); });
-      // The diagonal is in every pattern.
-    } else {
-      for (const int row : stencil)
-        for (const int column : stencil) pattern.emplace_back(row, column);
-    }
-  }
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::append_rank_one_terms(const Positions& x, StiffnessModel model,
-                                        std::vector<RankOneTerm>& terms) const {
-  if constexpr (is_structured)
-    for_each_enabled(x, [&](std::size_t e, auto& s) {
-      visit_structured(
-          e, s, model, [](int, int, const Matrix3&) {},
-          [&](Real coefficient, const Gradient<num_points>& mode) {
-            terms.push_back({coefficient, stencils_[e], mode});
-          });
-    });
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
-                                        Forces df) const {
+void Batch<Kind>::add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
+                              Forces df) const {
   const bool bare = model == StiffnessModel::gauss_newton || model == StiffnessModel::taut;
   for_each_enabled(x, [&](std::size_t e, auto& s) {
     gather(e, dx, s.vectors);
@@ -117,33 +100,7 @@ void Batch<Kind>::add_stiffness_product(const Positions& x, StiffnessModel model
 }
 
 template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_diagonal(const Positions& x, Real scale, Forces diagonal) const {
-  for_each_enabled(x, [&](std::size_t e, auto& s) {
-    const Stencil& stencil = stencils_[e];
-    if constexpr (is_structured) {
-      visit_structured(
-          e, s, StiffnessModel::gauss_newton,
-          [&](int i, int j, const Matrix3& block) {
-            if (i == j) diagonal.col(stencil[i]).template head<3>() += scale * block.diagonal();
-          },
-          [&](Real coefficient, const Gradient<num_points>& mode) {
-            scatter(e, mode.cwiseAbs2(), scale * coefficient, diagonal);
-          });
-    } else if constexpr (Constraint<Kind>) {
-      const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
-      if (!is_slack(e, c, StiffnessModel::gauss_newton))
-        scatter(e, s.gradient.cwiseAbs2(), scale * stiffnesses_[e], diagonal);
-    } else {
-      const Hessian<num_points> k =
-          stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, StiffnessModel::gauss_newton, profile(e));
-      s.gradient.reshaped() = k.diagonal();
-      scatter(e, s.gradient, scale, diagonal);
-    }
-  });
-}
-
-template <ElementKind Kind>
-void Batch<Kind>::add_stiffness_bounds(const Positions& x, std::span<Real> bounds) const {
+void Batch<Kind>::add_bounds(const Positions& x, std::span<Real> bounds) const {
   for_each_enabled(x, [&](std::size_t e, auto& s) {
     const Stencil& stencil = stencils_[e];
     const auto add_rank_one = [&](Real coefficient, const Gradient<num_points>& mode) {

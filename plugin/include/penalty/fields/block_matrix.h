@@ -7,9 +7,9 @@
 
 namespace penalty {
 
-/// Block-compressed rows. The pattern is built once, from the stencils that will be added; values can then be cleared and
-/// added again at every step. Elements come in the same order each time, so the matrix remembers where each block went
-/// and searches only where that order has changed; what it remembers is allocated in the first round.
+/// Block-compressed rows. The pattern is built once, from the stencils that will be added; values can then be cleared
+/// and added again at every step. Elements come in the same order each time, so the matrix remembers where each block
+/// went and searches only where that order has changed; what it remembers is allocated in the first round.
 class BlockMatrix {
  public:
   /// Pairs (row, column) of particle indices that may hold a block, in any order, repetitions allowed. The diagonal is

@@ -13,16 +13,13 @@ struct Break {
   Real energy;  // that it held [J]
 };
 
-/// The elements of a batch, numbered in the order in which they were added, and what may change about each of them while the
-/// simulation runs. Elements start plain; a modifier costs time only in the batch that uses it. Inside a Bullet world
-/// make changes through `AttachedBodies::edit`, which wakes the body.
+/// The elements of a batch, numbered in the order in which they were added, and what may change about each of them
+/// while the simulation runs. Elements start plain; a modifier costs time only in the batch that uses it. Inside a
+/// Bullet world make changes through `AttachedBodies::edit`, which wakes the body.
 ///
 /// Setters throw std::invalid_argument that names batch, element and value.
 class ElementBatch : public Potential {
  public:
-  std::string_view name() const override { return name_; }
-  std::size_t num_elements() const override { return stiffnesses_.size(); }
-
   /// K [J], positive and finite.
   void set_stiffness(int element, Real stiffness);
   Real stiffness(int element) const { return own_stiffness(check(element)); }
@@ -58,17 +55,13 @@ class ElementBatch : public Potential {
   void set_enabled(int element, bool enabled);
   bool is_enabled(int element) const { return stiffnesses_[check(element)] > 0; }
 
-  bool damps() const override { return !damping_times_.empty(); }
-  bool evolves() const override { return !plasticities_.empty() || !breakings_.empty(); }
-  void save_state() override;
-  void restore_state() override;
-  std::uint64_t stiffness_version() const override { return version_; }
-  void append_ledger(const Positions& x, std::vector<LedgerEntry>& ledger) const override;
+  void append_state(std::vector<Real>& state) const override;
+  std::size_t set_state(std::span<const Real> state) override;
 
  protected:
   /// `period` as in Profile.
   ElementBatch(int num_particles, std::string name, bool has_target, Real period)
-      : num_particles_(num_particles), name_(std::move(name)), has_target_(has_target), period_(period) {}
+      : Potential(std::move(name)), num_particles_(num_particles), has_target_(has_target), period_(period) {}
 
   [[noreturn]] void fail(std::size_t element, const std::string& what) const;
   std::size_t check(int element) const;
@@ -94,13 +87,6 @@ class ElementBatch : public Potential {
   std::vector<Profile>& profiles_to_change();
   void disable(std::size_t e);
 
-  struct State {
-    std::vector<Profile> profiles;
-    std::vector<Real> plastic_strains, stiffnesses, disabled_stiffnesses;
-    std::size_t num_breaks = 0, num_disabled = 0;
-  };
-
-  std::string name_;
   bool has_target_;
   Real period_;
   std::size_t num_disabled_ = 0;
@@ -112,8 +98,6 @@ class ElementBatch : public Potential {
   std::vector<Real> damping_times_;         // [s]
   std::vector<Real> disabled_stiffnesses_;  // of disabled elements, to return to [J]
   std::vector<Break> breaks_;
-  State saved_;
-  std::uint64_t version_ = 0;
 };
 
 }  // namespace penalty

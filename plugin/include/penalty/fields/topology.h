@@ -29,13 +29,13 @@ std::vector<Triangle> faces_of(std::span<const Tetrahedron> tetrahedra);
 /// Signed volume of each tetrahedron [m^3]. `vertices` is 3 x V [m].
 std::vector<Real> signed_volumes(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra);
 
-/// v_e = sum of V_t / 6 over the tetrahedra t around edge e [m^3], one per edge of `edges_of(tetrahedra)`: the shares of
-/// all edges add up to the volume of the mesh.
+/// v_e = sum of V_t / 6 over the tetrahedra t around edge e [m^3], one per edge of `edges_of(tetrahedra)`: the shares
+/// of all edges add up to the volume of the mesh.
 std::vector<Real> edge_volume_shares(std::span<const Edge> edges, std::span<const Tetrahedron> tetrahedra,
                                      std::span<const Real> volumes);
 
-/// v_f = sum of V_t / 4 over the tetrahedra t on both sides of face f [m^3], one per face of `faces_of(tetrahedra)`: the shares
-/// of all faces add up to the volume of the mesh.
+/// v_f = sum of V_t / 4 over the tetrahedra t on both sides of face f [m^3], one per face of `faces_of(tetrahedra)`:
+/// the shares of all faces add up to the volume of the mesh.
 std::vector<Real> face_volume_shares(std::span<const Triangle> faces, std::span<const Tetrahedron> tetrahedra,
                                      std::span<const Real> volumes);
 
@@ -48,16 +48,16 @@ std::vector<Real> face_volume_shares(std::span<const Triangle> faces, std::span<
 ///             \|/
 ///              p0
 ///
-/// Each inner edge once, sorted by (p0, p1); edges of one triangle only, the rim of an open surface, have no hinge. Throws
-/// std::invalid_argument that names the edge if it belongs to more than two triangles, or to two that run through it in the
-/// same direction: there is no left and right then.
+/// Each inner edge once, sorted by (p0, p1); edges of one triangle only, the rim of an open surface, have no hinge.
+/// Throws std::invalid_argument that names the edge if it belongs to more than two triangles, or to two that run
+/// through it in the same direction: there is no left and right then.
 std::vector<Hinge> hinges_of(std::span<const Triangle> triangles);
 
 /// Area of each triangle [m^2]. `vertices` is 3 x V [m].
 std::vector<Real> areas_of(const Eigen::Matrix3Xd& vertices, std::span<const Triangle> triangles);
 
-/// a_e = sum of A_t / 3 over the triangles t at edge e [m^2], one per edge of `edges_of(triangles)`: the shares of all edges
-/// add up to the area of the surface.
+/// a_e = sum of A_t / 3 over the triangles t at edge e [m^2], one per edge of `edges_of(triangles)`: the shares of all
+/// edges add up to the area of the surface.
 std::vector<Real> edge_area_shares(std::span<const Edge> edges, std::span<const Triangle> triangles,
                                    std::span<const Real> areas);
 

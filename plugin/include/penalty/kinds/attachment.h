@@ -4,22 +4,26 @@
 
 namespace penalty {
 
-/// C = (|p1 - p0| - d0) / length, dimensionless: a spring of K / length² [N/m]. Unlike Length, it may have no length at rest:
-/// two points that coincide then stay together, with the same stiffness in every direction.
+/// C = (|p1 - p0| - d0) / length, dimensionless: a spring of K / length² [N/m]. Unlike Length, it may have no length at
+/// rest: two points that coincide then stay together, with the same stiffness in every direction.
 ///
 /// Gradient: dC/dp1 = n / length = -dC/dp0, n = (p1 - p0) / |p1 - p0|: Distance with p0 for its target, which takes the
 /// reaction. Coincident points are as there.
 struct Attachment {
   static constexpr std::string_view name = "attachment";
   static constexpr int num_points = 2;
+  static constexpr bool rests_in_one_place = true;
 
-  /// A prototype: `length` [m] is the stretch at which C = 1. Throws std::invalid_argument unless it is positive and finite.
+  /// A prototype: `length` [m] is the stretch at which C = 1. Throws std::invalid_argument unless it is positive and
+  /// finite.
   static Attachment of_length(Real length) {
     if (!(length > 0) || length - length != 0)
       throw std::invalid_argument(std::string(name) + ": length is " + to_text(length) +
                                   ", must be positive and finite");
     return {1 / length, 0, Eigen::Vector3f::UnitX()};
   }
+
+  static Attachment example(Real size) { return of_length(0.4 * size); }
 
   /// The one with d0 = |rest1 - rest0|. Throws std::invalid_argument for a rest distance that is not finite.
   Attachment at_rest(const Points<2>& rest) const {

@@ -17,7 +17,8 @@ namespace penalty {
 ///             p3                 theta > 0: the tips bend away from the side that the normals point to, and the
 ///                                tetrahedron p0 p1 p2 p3 has a negative volume
 ///
-/// Any rest angle will do, 0 among them: flat cloth. Exchanging p0 and p1, or p2 and p3, turns the sign of theta; both together keep it.
+/// Any rest angle will do, 0 among them: flat cloth. Exchanging p0 and p1, or p2 and p3, turns the sign of theta; both
+/// together keep it.
 ///
 /// Gradient: of the tips -N/|N| over the height of the wing, of the edge such that there is no net force and no torque
 /// (detail::FoldedEdge; Bridson, Marino and Fedkiw 2003, Grinspun et al. 2003).

@@ -29,6 +29,15 @@ struct Distance {
     return {target, 0, 0, Eigen::Vector3f::UnitX()};
   }
 
+  static Distance example(Real size) { return to(Vector3::Constant(size)); }
+
+  /// The same with its target elsewhere.
+  Distance moved(const Matrix3& rotation, const Vector3& translation) const {
+    Distance kind = *this;
+    kind.target = rotation * target + translation;
+    return kind;
+  }
+
   /// Holds the point at the target; `length` [m] is the distance where C = 1. Throws std::invalid_argument for a target
   /// that is not finite and a length that is not positive and finite.
   static Distance pinned(const Vector3& target, Real length) {

@@ -46,6 +46,12 @@ class EnclosedVolume {
     triangles_ = std::make_shared<const std::vector<Triangle>>(std::move(triangles));
   }
 
+  static constexpr int num_example_points = 6;  // of an octahedron
+  static EnclosedVolume example(Real /*size*/) {
+    return EnclosedVolume(
+        std::vector<Triangle>{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}});
+  }
+
   /// The kind that is zero at `rest`, 3 x (largest index + 1). Throws std::invalid_argument for another number of
   /// points, and for a rest volume that is not finite or is zero (less than 1e-15 of the cube of the surface's extent).
   EnclosedVolume at_rest(const Points<dynamic>& rest) const {

@@ -1,4 +1,4 @@
-// Is the gradient that came with a constraint the derivative of its value?
+// Is the gradient that came with a kind the derivative of its value?
 #pragma once
 #include <algorithm>
 #include <array>
@@ -45,13 +45,22 @@ struct GradientComparison {
   Real norm = 0;   // of the larger of the two gradients
 };
 
-template <Constraint Kind>
+template <ElementKind Kind>
 GradientComparison compare_gradient(const Kind& kind, const Points<Kind::num_points>& points, Real step) {
   constexpr int n = Kind::num_points;
   constexpr Eigen::Index most_points = 64;
-  const Gradient<n> gradient = kind.gradient(points);
+  Gradient<n> gradient(3, points.cols());
+  if constexpr (Constraint<Kind>)
+    gradient = kind.gradient(points);
+  else
+    kind.energy_and_gradient(points, gradient);
   Points<n> moved = points;
-  const auto value = [&kind](const Points<n>& p) { return kind.value(p); };
+  const auto value = [&kind](const Points<n>& p) {
+    if constexpr (Constraint<Kind>)
+      return kind.value(p);
+    else
+      return kind.energy(p);
+  };
   GradientComparison worst;
   Real given_square = 0, differences_square = 0;
   const Eigen::Index count = std::min(points.cols(), most_points);
@@ -76,11 +85,11 @@ GradientComparison compare_gradient(const Kind& kind, const Points<Kind::num_poi
 
 }  // namespace detail
 
-/// Compares gradient(points) with central differences at `points`, which are the rest points, and at a copy whose
-/// coordinates are moved by up to 10 % of the stencil's size, the same way in every run. Throws std::invalid_argument,
-/// one line that begins with `label` and names the worst entry, if an entry is off by more than 1e-4 of the norm of the
-/// gradient or is not finite: "user constraint 3: at rest, dC/dp1.y is 0.5, central differences give 0.25". Of more
-/// than 64 points only 64, evenly spread, are compared.
+/// Compares gradient(points), of an energy that of `energy_and_gradient`, with central differences at `points`, which
+/// are the rest points, and at a copy whose coordinates are moved by up to 10 % of the stencil's size, the same way in
+/// every run. Throws std::invalid_argument, one line that begins with `label` and names the worst entry, if an entry is
+/// off by more than 1e-4 of the norm of the gradient or is not finite: "user constraint 3: at rest, dC/dp1.y is 0.5,
+/// central differences give 0.25". Of more than 64 points only 64, evenly spread, are compared.
 ///
 /// Why 1e-4: central differences of step h are off by h² C'''/6 + 1e-16 |f| / h, f being C with whatever it subtracts.
 /// Steps from 1e-3 to 1e-6 of the stencil's size are tried and one that agrees is enough, since a wrong gradient agrees
@@ -88,7 +97,7 @@ GradientComparison compare_gradient(const Kind& kind, const Points<Kind::num_poi
 /// is less than 1e7 times its change over the stencil, or it stands less than 1e7 sizes from the origin; a missing term
 /// of 1 % is a hundred times too large. A gradient that vanishes at rest is measured by a thousandth of that of the
 /// moved copy.
-template <Constraint Kind>
+template <ElementKind Kind>
 void check_gradient(const Kind& kind, const Points<Kind::num_points>& points, std::string_view label) {
   constexpr Real tolerance = 1e-4;
   constexpr std::array<Real, 4> steps{1e-4, 1e-5, 1e-3, 1e-6};
@@ -110,9 +119,10 @@ void check_gradient(const Kind& kind, const Points<Kind::num_points>& points, st
       if (agrees) break;
     }
     if (agrees) continue;
-    throw std::invalid_argument(std::string(label) + (at_rest ? ": at rest, dC/dp" : ": near rest, dC/dp") +
-                                std::to_string(first.point) + "." + "xyz"[first.axis] + " is " + to_text(first.given) +
-                                ", central differences give " + to_text(first.differences));
+    throw std::invalid_argument(std::string(label) + (at_rest ? ": at rest, " : ": near rest, ") +
+                                (Constraint<Kind> ? "dC/dp" : "dpsi/dp") + std::to_string(first.point) + "." +
+                                "xyz"[first.axis] + " is " + to_text(first.given) + ", central differences give " +
+                                to_text(first.differences));
   }
 }
 

@@ -100,8 +100,8 @@ inline Real wrapped_difference(Real angle, Real rest_angle) {
   return difference;
 }
 
-/// The kinds that measure a folded edge: C is the angle less the rest angle, wrapped to (-pi, pi]. `Kind` has a name and
-/// `angle_of(edge)`, which differs from theta by a constant or not at all.
+/// The kinds that measure a folded edge: C is the angle less the rest angle, wrapped to (-pi, pi]. `Kind` has a name
+/// and `angle_of(edge)`, which differs from theta by a constant or not at all.
 template <class Kind>
 struct AngleAboutEdge {
   static constexpr int num_points = 4;

@@ -12,8 +12,8 @@ namespace penalty {
 ///     p0 o-------o p1        n = (p1 - p0) / |p1 - p0|
 ///
 /// Gradient: dC/dp1 = n / L0 = -dC/dp0 (seed eq. 10-13). A spring of stiffness k [N/m] is K = k L0² [J].
-/// Coincident points (closer than 1e-9 L0) have no direction: n is then the direction at rest and the Hessian is zero, so
-/// the force still pushes the points apart.
+/// Coincident points (closer than 1e-9 L0) have no direction: n is then the direction at rest and the Hessian is zero,
+/// so the force still pushes the points apart.
 struct Length {
   static constexpr std::string_view name = "length";
   static constexpr int num_points = 2;

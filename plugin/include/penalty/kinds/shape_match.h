@@ -37,6 +37,8 @@ class ShapeMatch {
   static constexpr std::string_view name = "shape match";
   static constexpr int num_points = dynamic;
 
+  static constexpr int num_example_points = 7;
+
   /// A prototype; no weights: all are 1.
   ShapeMatch() = default;
 

@@ -40,6 +40,8 @@ struct StableNeoHookean {
     return {Matrix3::Zero(), lambda_over_mu};
   }
 
+  static StableNeoHookean example(Real /*size*/) { return with_ratio(1.5); }
+
   /// The same material with these points at rest. Throws std::invalid_argument for a rest volume that is zero or not
   /// finite.
   StableNeoHookean at_rest(const Points<4>& rest) const {
@@ -109,8 +111,8 @@ struct StableNeoHookean {
   }
 
   /// d²psi/dp² with the negative eigenvalues of d²psi/dF² set to zero, as is usual: positive semidefinite, no less than
-  /// d²psi/dp², and equal to it where that is positive semidefinite already. Among such matrices it is not the nearest one
-  /// to d²psi/dp²: that would depend on the shape at rest, and this one depends on the material and F only.
+  /// d²psi/dp², and equal to it where that is positive semidefinite already. Among such matrices it is not the nearest
+  /// one to d²psi/dp²: that would depend on the shape at rest, and this one depends on the material and F only.
   ///
   /// dpsi/dI = m/2 (1 - 1/(I + 1)), d²psi/dI² = m/2 / (I + 1)², dpsi/dJ = l (J - alpha), d²psi/dJ² = l.
   Hessian<4> projected_hessian(const Points<4>& p) const {

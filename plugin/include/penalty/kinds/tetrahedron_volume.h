@@ -17,12 +17,12 @@ namespace penalty {
 ///         \ | /
 ///          p1
 ///
-/// Gradient (seed eq. 18-20, written for p1): dC/dp1 = b x c / 6V0, dC/dp2 = c x a / 6V0, dC/dp3 = a x b / 6V0 and dC/dp0
-/// is minus their sum. To get them from one formula by renaming the points, as after seed eq. 20, the renaming must be an
-/// even permutation: a cyclic shift of four points is odd and turns the sign of V.
+/// Gradient (seed eq. 18-20, written for p1): dC/dp1 = b x c / 6V0, dC/dp2 = c x a / 6V0, dC/dp3 = a x b / 6V0 and
+/// dC/dp0 is minus their sum. To get them from one formula by renaming the points, as after seed eq. 20, the renaming
+/// must be an even permutation: a cyclic shift of four points is odd and turns the sign of V.
 ///
-/// V0 is the signed rest volume, so either orientation works, and an inverted tetrahedron is pulled back through flat: V
-/// is a polynomial, without degenerate points. Only where the points are collinear or coincide is the gradient zero.
+/// V0 is the signed rest volume, so either orientation works, and an inverted tetrahedron is pulled back through flat:
+/// V is a polynomial, without degenerate points. Only where the points are collinear or coincide is the gradient zero.
 struct TetrahedronVolume {
   static constexpr std::string_view name = "tetrahedron volume";
   static constexpr int num_points = 4;
@@ -49,8 +49,8 @@ struct TetrahedronVolume {
     return g;
   }
 
-  /// Inlined whatever the compiler thinks of it, as in every kind that bodies are made of: called, it costs the loop over the
-  /// elements twice the instructions.
+  /// Inlined whatever the compiler thinks of it, as in every kind that bodies are made of: called, it costs the loop
+  /// over the elements twice the instructions.
   [[gnu::always_inline]] Real value_and_gradient(const Points<4>& p, Gradient<4>& g) const {
     const Triple p0 = Triple::column(p, 0);
     const Triple a = Triple::column(p, 1) - p0, b = Triple::column(p, 2) - p0, c = Triple::column(p, 3) - p0;
@@ -63,8 +63,8 @@ struct TetrahedronVolume {
     return dot(a, g1) - 1;
   }
 
-  /// Off-diagonal blocks are cross matrices of edges: d²V/dp1dp2 = -[c]/6, d²V/dp2dp3 = -[a]/6, d²V/dp3dp1 = -[b]/6; the
-  /// diagonal is zero and every row of blocks sums to zero.
+  /// Off-diagonal blocks are cross matrices of edges: d²V/dp1dp2 = -[c]/6, d²V/dp2dp3 = -[a]/6, d²V/dp3dp1 = -[b]/6;
+  /// the diagonal is zero and every row of blocks sums to zero.
   Hessian<4> hessian(const Points<4>& p) const {
     const Real scale = inverse_rest_volume / 6;
     const Matrix3 a = cross_matrix(p.col(1) - p.col(0)) * scale;
@@ -79,8 +79,8 @@ struct TetrahedronVolume {
     return h;
   }
 
-  /// V = det(Y) / 3 with Y = [p0, p1, p2, p3] Q = [a, b, c] M, the columns of Q orthonormal and across (1, 1, 1, 1) and M
-  /// its last three rows. As Q is orthonormal, the nearest matrix for Y is also the nearest one for p.
+  /// V = det(Y) / 3 with Y = [p0, p1, p2, p3] Q = [a, b, c] M, the columns of Q orthonormal and across (1, 1, 1, 1) and
+  /// M its last three rows. As Q is orthonormal, the nearest matrix for Y is also the nearest one for p.
   Hessian<4> projected_stiffness(const Points<4>& p, Real strain) const {
     const Triple p0 = Triple::column(p, 0);
     const Triple a = Triple::column(p, 1) - p0, b = Triple::column(p, 2) - p0, c = Triple::column(p, 3) - p0;

@@ -78,7 +78,8 @@ class UserConstraint {
     return (value - offset_) * scale_;
   }
 
-  Hessian<N> hessian(const Points<N>& p) const requires requires(const Function& f) { f.hessian(p); }
+  Hessian<N> hessian(const Points<N>& p) const
+    requires requires(const Function& f) { f.hessian(p); }
   {
     Hessian<N> h = function_.hessian(p);
     if (scale_ != 1) h *= scale_;

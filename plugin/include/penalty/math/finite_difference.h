@@ -4,13 +4,13 @@
 
 namespace penalty {
 
-/// Gradient of `value(points)` by central differences, (C(p + h e) - C(p - h e)) / 2h for each coordinate (seed eq. 4-6).
-/// `step` h in metres: about 6e-6 times the size of the stencil balances truncation against round-off.
+/// Gradient of `value(points)` by central differences, (C(p + h e) - C(p - h e)) / 2h for each coordinate (seed eq.
+/// 4-6). `step` h in metres: about 6e-6 times the size of the stencil balances truncation against round-off.
 template <int N, class Value>
 Gradient<N> central_difference_gradient(const Value& value, const Points<N>& points, Real step) {
-  Gradient<N> gradient;
+  Gradient<N> gradient(3, points.cols());
   Points<N> moved = points;
-  for (int k = 0; k < 3 * N; ++k) {
+  for (Eigen::Index k = 0; k < points.size(); ++k) {
     Real& coordinate = moved.data()[k];
     const Real start = coordinate;
     coordinate = start + step;
@@ -26,9 +26,9 @@ Gradient<N> central_difference_gradient(const Value& value, const Points<N>& poi
 /// Hessian from central differences of `gradient(points)`, one column per coordinate; not symmetrised.
 template <int N, class GradientFunction>
 Hessian<N> central_difference_hessian(const GradientFunction& gradient, const Points<N>& points, Real step) {
-  Hessian<N> hessian;
+  Hessian<N> hessian(points.size(), points.size());
   Points<N> moved = points;
-  for (int k = 0; k < 3 * N; ++k) {
+  for (Eigen::Index k = 0; k < points.size(); ++k) {
     Real& coordinate = moved.data()[k];
     const Real start = coordinate;
     coordinate = start + step;

@@ -30,9 +30,9 @@ struct RigidVelocity {
 /// What stands for the masses of points: one number each, or its inverse.
 enum class PointWeights { direct, inverse };
 
-/// The rigid motion with the linear and the angular momentum of `velocities`, for point masses `weights`, one a point: the
-/// nearest one in the sense of sum weight |v - v_rigid|². Where the points are on a line, or all in one place, the part of
-/// the spin that moves nothing is zero.
+/// The rigid motion with the linear and the angular momentum of `velocities`, for point masses `weights`, one a point:
+/// the nearest one in the sense of sum weight |v - v_rigid|². Where the points are on a line, or all in one place, the
+/// part of the spin that moves nothing is zero.
 RigidVelocity best_rigid_velocity(const Points<dynamic>& points, const Points<dynamic>& velocities,
                                   std::span<const Real> weights, PointWeights kind = PointWeights::direct);
 

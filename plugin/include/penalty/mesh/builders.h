@@ -6,13 +6,13 @@
 
 namespace penalty {
 
-/// Into how many tetrahedra a cell of a box is cut. `five`: one in the middle and four corners, mirrored from cell to cell
-/// so that faces match. `six`: around the diagonal from the lowest to the highest corner (Kuhn), all cells alike.
+/// Into how many tetrahedra a cell of a box is cut. `five`: one in the middle and four corners, mirrored from cell to
+/// cell so that faces match. `six`: around the diagonal from the lowest to the highest corner (Kuhn), all cells alike.
 enum class BoxSplit { five, six };
 
-/// The box [0, size.x] x [0, size.y] x [0, size.z] [m] of cells.x * cells.y * cells.z cells, cut into tetrahedra. Vertices
-/// are numbered slice by slice across the direction of most cells (x before y before z if equal): neighbours in space are
-/// then at most one slice apart in memory.
+/// The box [0, size.x] x [0, size.y] x [0, size.z] [m] of cells.x * cells.y * cells.z cells, cut into tetrahedra.
+/// Vertices are numbered slice by slice across the direction of most cells (x before y before z if equal): neighbours
+/// in space are then at most one slice apart in memory.
 /// Throws std::invalid_argument, naming the argument: sizes must be positive and finite, cells at least 1 and at most
 /// 10^8 together.
 TetMesh make_box(const Vector3& size, const std::array<int, 3>& cells, BoxSplit split = BoxSplit::five);

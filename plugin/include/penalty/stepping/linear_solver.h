@@ -3,15 +3,15 @@
 #include <span>
 #include <vector>
 
-#include "penalty/fields/potential.h"
+#include "penalty/fields/system.h"
+#include "penalty/stepping/step_options.h"
 
 namespace penalty {
 
-/// A symmetric positive definite matrix: blocks and terms that are too dense for them. Particles in `fixed`, sorted, do not
-/// move: their rows and columns count as those of the identity.
+/// A positive definite system. Particles in `fixed`, sorted, do not move: their rows and columns count as those of the
+/// identity.
 struct LinearSystem {
-  BlockMatrix matrix;
-  std::vector<RankOneTerm> terms;
+  System matrix;
   std::vector<int> fixed;
 
   /// y = A x but for the rows of fixed particles, which are zero; those of x are to be zero.
@@ -19,11 +19,6 @@ struct LinearSystem {
 
   /// Sets the columns of fixed particles to zero.
   void clear_fixed(Forces v) const;
-};
-
-struct LinearOptions {
-  int max_iterations = 60;
-  Real tolerance = 1e-2;  // reduction of the residual in the norm of the preconditioner
 };
 
 struct LinearReport {
@@ -43,8 +38,8 @@ class LinearSolver {
   /// Prepares the preconditioner for the values of the system, with particles at `x` [m].
   void factorize(const LinearSystem& system, const Positions& x);
 
-  /// Solves A x = b from x = 0; the columns of fixed particles become zero. Whatever the number of iterations, b . x > 0
-  /// unless b is zero or not finite.
+  /// Solves A x = b from x = 0; the columns of fixed particles become zero. Whatever the number of iterations, b . x >
+  /// 0 unless b is zero or not finite.
   LinearReport solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x);
 
   /// r . P⁻¹ r, P the preconditioner.

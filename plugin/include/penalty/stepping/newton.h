@@ -1,5 +1,6 @@
 // Projected Newton's method with a line search: the engine of the implicit step and of static relaxation.
 #pragma once
+#include "penalty/fields/potential_field.h"
 #include "penalty/stepping/linear_solver.h"
 
 namespace penalty {
@@ -8,10 +9,10 @@ namespace penalty {
 ///
 ///     Phi(x) = E(x) + sum_i w_i/2 |x_i - t_i|² - sum_i f_i . x_i + (x - x0)ᵀ D (x - x0) / 2
 ///
-/// E is the potential; the implicit step has w_i = m_i / h² and t_i where particle i would be without forces; damping
-/// has D = damping matrix / h at x0, where the step began. Whatever is empty is left out.
+/// E is the energy of the field; the implicit step has w_i = m_i / h² and t_i where particle i would be without forces;
+/// damping has D = damping matrix / h at x0, where the step began. Whatever is empty is left out.
 struct Objective {
-  const Potential* potential = nullptr;
+  const PotentialField* field = nullptr;
   std::vector<Real> weights;  // w_i [N/m]
   PackedVectors targets;      // t_i [m]
   PackedVectors loads;        // f_i [N]
@@ -28,15 +29,15 @@ struct NewtonIteration {
   int linear_iterations = 0;
 };
 
-/// Minimises by Newton's method: the stiffness of every element is projected on the positive semidefinite matrices, so that
-/// each direction leads downhill, and the line search makes sure that Phi falls, or, where that is lost in round-off, its slope. Deterministic, and without allocation
-/// once the pattern is made, but for elements of many points.
+/// Minimises by Newton's method: the stiffness of every element is projected on the positive semidefinite matrices, so
+/// that each direction leads downhill, and the line search makes sure that Phi falls, or, where that is lost in
+/// round-off, its slope. Deterministic, and without allocation once the pattern is made and a step was taken.
 class NewtonSolver {
  public:
   /// Makes the pattern of the matrix: once, and after elements were added.
-  void set_pattern(const Potential& potential, int num_particles);
-  bool has_pattern_of(const Potential& potential) const {
-    return potential_ == &potential && elements_ == potential.num_elements();
+  void set_pattern(const PotentialField& field);
+  bool has_pattern_of(const PotentialField& field) const {
+    return field_ == &field && num_elements_ == field.num_elements();
   }
 
   /// Particles that do not move; to be added in ascending order.
@@ -76,10 +77,10 @@ class NewtonSolver {
   void evaluate(State& state);
   void assemble();
 
-  const Potential* potential_ = nullptr;
-  std::size_t elements_ = 0;
-  LinearSystem system_{BlockMatrix(0, {}), {}, {}};
-  LinearSystem damping_{BlockMatrix(0, {}), {}, {}};
+  const PotentialField* field_ = nullptr;  // that the pattern was made of
+  std::size_t num_elements_ = 0;
+  LinearSystem system_;
+  System damping_;
   LinearSolver solver_;
   State here_, trial_;
   Real energy_noise_ = 0;  // of the potential, a guess [J]

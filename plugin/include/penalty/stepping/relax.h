@@ -4,7 +4,7 @@
 #include <string>
 
 #include "penalty/fields/potential_field.h"
-#include "penalty/stepping/newton.h"
+#include "penalty/stepping/step_options.h"
 
 namespace penalty {
 
@@ -24,8 +24,8 @@ struct RelaxOptions {
   LinearOptions linear = {};
   std::vector<int> pinned = {};  // particles that stay where they are
   PackedVectors loads = {};      // constant forces, column i on particle i [N]; empty: none
-  /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it, see
-  /// penalty::unfold: forces alone may not.
+  /// Particles that lie in a space of fewer dimensions than at rest, a plane, a line or a point, are moved out of it,
+  /// see penalty::unfold: forces alone may not.
   bool unfold = true;
   /// Called after every iteration; false ends the relaxation there.
   std::function<bool(const RelaxProgress&)> observe = {};
@@ -49,12 +49,13 @@ struct RelaxReport {
   std::string message() const;  // one line
 };
 
-/// Moves `positions`, column i that of particle i [m], to a minimum of the potential, by projected Newton iterations with a line
-/// search: the energy only falls, but for round-off. What is not pinned stays free to turn and drift as a whole. A potential of several
-/// phases changes them on the way. The minimum is a local one: of a body at rest the energy is zero, so look at it.
+/// Moves `positions`, column i that of particle i [m], to a minimum of the potential, by projected Newton iterations
+/// with a line search: the energy only falls, but for round-off. What is not pinned stays free to turn and drift as a
+/// whole. A potential of several phases changes them on the way. The minimum is a local one: of a body at rest the
+/// energy is zero, so look at it.
 ///
-/// Throws std::invalid_argument for positions or loads of another size than the field has particles, positions or loads that
-/// are not finite, a pinned index out of range, and options out of range; it names what, which and the value.
+/// Throws std::invalid_argument for positions or loads of another size than the field has particles, positions or loads
+/// that are not finite, a pinned index out of range, and options out of range; it names what, which and the value.
 RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOptions& options = {});
 
 }  // namespace penalty

@@ -1,0 +1,32 @@
+// Where two bodies touch.
+#pragma once
+#include "penalty/contact/weighted_point.h"
+
+namespace penalty {
+
+/// One end of a contact or of a coupling: a point of the particles of a body, or a point fixed in a rigid body.
+struct Side {
+  int body = -1;                     // index into the bodies of the island; -1: a rigid body's
+  int rigid = -1;                    // index into its rigid bodies
+  WeightedPoint point = {};          // of the particles of `body`
+  Vector3 anchor = Vector3::Zero();  // in the frame of the rigid body [m]
+
+  static Side of_particles(int body, const WeightedPoint& point) { return {.body = body, .point = point}; }
+  static Side of_rigid(int rigid, const Vector3& anchor) { return {.rigid = rigid, .anchor = anchor}; }
+  bool is_rigid() const { return body < 0; }
+};
+
+/// The point of `a`, which belongs to particles, may not go below the plane through the point of `b` with unit normal
+/// `normal`, which points from b to a; or, with a positive `radius`, not come closer to the point of b than that: the
+/// surface of a ball. Where b is rigid the normal is fixed in its frame, else in the world.
+struct Contact {
+  Side a, b;
+  Vector3 normal = Vector3::UnitY();
+  Real radius = 0;    // of a ball about the point of b; zero: a plane [m]
+  Real friction = 0;  // Coulomb coefficient
+
+  Real depth = 0;                     // largest depth during the step [m], reported
+  Vector3 impulse = Vector3::Zero();  // on a, of the last sweep [N s], reported
+};
+
+}  // namespace penalty

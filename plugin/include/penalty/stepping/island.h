@@ -1,0 +1,118 @@
+// One world step of all that touches or holds one another: many explicit substeps, or one implicit one.
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "penalty/contact/contact.h"
+#include "penalty/fields/potential_field.h"
+#include "penalty/math/affine_span.h"
+#include "penalty/stepping/newton.h"
+#include "penalty/stepping/particles.h"
+#include "penalty/stepping/rigid_body.h"
+#include "penalty/stepping/step_report.h"
+
+namespace penalty {
+
+/// What implicit steps keep between steps.
+struct ImplicitState {
+  NewtonSolver newton;
+  PackedVectors acceleration;  // mean one of the last step [m/s²]
+  bool has_acceleration = false;
+  PackedVectors from, guess;  // what the step works in
+};
+
+/// A soft body: its state, its field and what the integrator remembers of it between steps. The field outlives the
+/// body.
+struct SteppedBody {
+  Particles particles;
+  PotentialField* field = nullptr;
+  StepOptions options;
+  Vector3 gravity = Vector3::Zero();  // [m/s²]
+  PackedVectors external_forces;      // constant over the step [N]; empty: none
+  Real largest_eigenvalue = 0;        // of M^-1 K at rest, an upper bound [1/s²]: see estimate_stability
+  StepReport report;                  // of the last step
+  EnergyFlows flows;                  // of all steps
+
+  /// Forgets what was computed at earlier positions: call after changing positions, external forces or the field.
+  void positions_changed() { forces_valid = false; }
+
+  // What the integrator keeps between steps.
+  PackedVectors forces;  // at `particles.positions`, external ones included [N]
+  Real elastic_energy = 0;
+  bool forces_valid = false;
+  EnergyFlows step_flows;           // of the attempt at the present step
+  std::optional<Real> last_energy;  // at the end of the last step [J]
+  int last_substeps = 0;            // what the energy guard settled on
+  Real mass = 0;                    // of the particles that are not pinned [kg]
+  Real energy_noise = 0;            // growth of energy that means nothing [J]
+  Particles start;                  // positions and velocities to go back to,
+  FieldState start_state;           // and what flowed, broke and changed phase
+  AffineSpan rest_span;
+  ImplicitState implicit;
+};
+
+/// A potential over points of several bodies: attachments, joints of flesh and bone. Particle i of the field is
+/// points[i]. Rigid bodies get the reaction.
+struct Coupling {
+  std::vector<Side> points;
+  PotentialField* field = nullptr;
+  Real damping_time = 0;        // as in StepOptions [s]
+  Real largest_eigenvalue = 0;  // see estimate_stability [1/s²]
+  Real elastic_energy = 0;      // at the end of the last step [J]
+
+  // What the integrator works in.
+  bool has_driven_points = false;  // points of no mobility, which may be moved
+  PackedVectors positions, velocities, previous_velocities, forces;
+  std::vector<Real> inverse_masses;  // no less than the mobility of the point in any direction, whatever the others do
+  FieldState start_state;
+};
+
+/// Bodies that touch the same rigid bodies, touch each other or are coupled, and all that is between them: what has to
+/// be stepped together.
+struct Island {
+  std::vector<SteppedBody*> bodies = {};
+  std::vector<RigidBody> rigid_bodies = {};
+  std::vector<Coupling*> couplings = {};
+  std::vector<Contact> contacts = {};  // of this step; `advance` puts them in the order of the bodies of their sides a
+
+  // What the integrator works in.
+  std::vector<RigidBody> rigid_start = {};
+  std::vector<std::size_t> contacts_begin = {};  // of the contacts of each body, and their end
+};
+
+/// Sets `largest_eigenvalue` from the stiffness at the rest positions of the field. Call once, and after a change of
+/// masses, stiffness or elements.
+void estimate_stability(SteppedBody& body);
+
+/// Sets the inverse masses of the points and, if they changed or `anew`, `largest_eigenvalue` from the Gershgorin row
+/// sums of the stiffness at the rest positions of the coupling's field: bodies turn against each other, and these do
+/// not depend on directions.
+void estimate_stability(Coupling& coupling, const Island& island, bool anew);
+
+/// Advances an island over `duration` [s] and says what was done; a duration that is not positive and finite is no
+/// step.
+///
+/// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with one sweep of contacts before each drift. At
+/// the start and the end positions and velocities belong to the same instant, and only there, or at the end of a block
+/// of substeps, is damping applied: touched half a substep apart, it would feed the fastest modes. The number of
+/// substeps follows from the stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That limit
+/// belongs to the rest shape; far from it a step may still gain energy. If kinetic + elastic energy, less the work of
+/// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
+/// many substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen at the
+/// end of a block, up to eight times a step; what they take is no growth.
+///
+/// Implicitly, a body by itself, see Integrator: the positions at the end minimise
+///
+///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h
+///
+/// by projected Newton iterations with a line search. Unlike that minimum, which turns too slowly, the step keeps the
+/// angular momentum of a free body, and the linear one in spite of iterations that end early: a rigid velocity is
+/// added. Energy that would grow all the same is taken from the velocities that deform the body. StepReport says how
+/// much.
+///
+/// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off, but for the gyroscopic term
+/// of a rigid body with unequal moments of inertia, which is left to Bullet. A step that cannot be made finite is
+/// undone and reported, never handed on.
+StepReport advance(Island& island, Real duration);
+
+}  // namespace penalty

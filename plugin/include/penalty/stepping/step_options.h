@@ -1,0 +1,48 @@
+// How a body is stepped.
+#pragma once
+#include "penalty/math/types.h"
+
+namespace penalty {
+
+enum class Integrator {
+  automatic,      // explicit up to `crossover_substeps`, else implicit
+  explicit_step,  // sub-cycled velocity Verlet
+  implicit_step,  // backward Euler; where something touches the body or couples it to others: explicit
+};
+
+/// Substeps up to which sub-cycling costs less than an implicit step with its default options: as many were measured to
+/// cost the same in a body of 1280 tetrahedra (81) and in one of 10240 (124).
+inline constexpr int crossover_substeps = 100;
+
+/// Of conjugate gradients.
+struct LinearOptions {
+  int max_iterations = 60;
+  Real tolerance = 1e-2;  // reduction of the residual in the norm of the preconditioner
+
+  /// Throws std::invalid_argument that begins with `what` and names the option and its value.
+  void check(const char* what) const;
+};
+
+/// How a body is stepped. Nothing damps by default; `damping_time` and `drag` do. (Far from rest the energy guard still
+/// takes a little: it repeats steps that gain energy, not those that lose it.)
+struct StepOptions {
+  Integrator integrator = Integrator::automatic;
+  Real damping_time = 0;          // ratio of damping to stiffness along the constraint gradients, beta [s]
+  Real drag = 0;                  // rate at which all velocities decay [1/s]; does not keep momentum
+  int substeps = 0;               // in a step; 0: from the stability limit
+  Real safety = 0.99;             // share of the stability limit that a substep may use, in (0, 1]
+  Real contact_safety = 0.7;      // the same while the body is in contact: impacts excite the fastest modes
+  Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps
+  int max_substeps = 20000;       // beyond this a step is taken as it is, if it is finite
+  Real contact_slop = 1e-4;       // depth that is left alone [m]
+  int newton_iterations = 8;      // most of an implicit step
+  Real newton_tolerance = 1e-3;   // ends them: what is left of the forces that are not balanced, in the norm of the
+                                  // preconditioner
+  LinearOptions linear = {};      // of each Newton iteration
+  bool unfold = true;             // out of a plane, a line or a point: see penalty::unfold
+
+  /// Throws std::invalid_argument that names the option and its value.
+  void check() const;
+};
+
+}  // namespace penalty

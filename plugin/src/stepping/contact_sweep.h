@@ -1,0 +1,37 @@
+// Contacts as one-sided velocity constraints.
+#pragma once
+#include "penalty/stepping/island.h"
+
+namespace penalty {
+
+/// What a sweep did to energy [J].
+struct ContactWork {
+  Real obstacles = 0;  // by bodies that move but take no impulse
+  Real particles = 0;  // on the particles of the sides a
+  Real loss = 0;       // to impact and friction
+};
+
+/// One sweep over the contacts of body `body` of the island at positions that are about to drift for `duration` h [s].
+/// Of the gap g and the relative normal speed u the sweep asks u >= -g/h while the gap is open and u >= 0 when it is
+/// closed: it stops approach, and never pushes out by velocity. The impulse goes to side a and, with the opposite sign,
+/// to side b: to a rigid body at the point of a, so that both momenta are kept to round-off. Friction is clipped to
+/// Coulomb's cone. Depth beyond the slop of the body against bodies that cannot move is taken back by position, one per
+/// cent a sweep.
+ContactWork solve_contacts(Island& island, std::size_t body, Real duration);
+
+/// The contacts whose side a belongs to body number `body`.
+inline std::span<Contact> contacts_of(Island& island, std::size_t body) {
+  const std::size_t begin = island.contacts_begin[body];
+  return {island.contacts.data() + begin, island.contacts_begin[body + 1] - begin};
+}
+
+/// Some contact has particles of this body on one of its sides.
+bool is_in_contact(const Island& island, std::size_t body);
+
+/// Puts the contacts in the order of the bodies of their sides a, and remembers where those of each begin.
+void sort_contacts(Island& island);
+
+/// The inverse of the mass that an impulse along `direction` at `arm` from the centre of mass meets.
+Real mobility(const RigidBody& body, const Vector3& arm, const Vector3& direction);
+
+}  // namespace penalty
