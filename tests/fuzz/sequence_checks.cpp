@@ -115,7 +115,8 @@ void Sequence::check_nodes(const Body& body, bool was_sound, bool stepped) const
               (was_sound ? ", although all that went in was" : ""));
   require(!was_sound || nodes_are_finite(*body.soft), "nodes are not finite, although all that went in was");
   if (!legal()) return;
-  require(body.tangled || body.home->penalty().report(*body.soft).finite, "a legal step is reported as not finite");
+  require(body.tangled || body.home->penalty().report(*body.soft).finite,
+          "a legal step is reported as not finite: " + body.home->penalty().report(*body.soft).problem);
   if (!stepped || !body.in_world() || body.stopped || depth_ > 0 || !called_back_.empty()) return;
   for (int i = 0; i < particles.size(); ++i) {
     const Vector3 x = particles.positions.col(i).head<3>(), node = to_vector(body.soft->m_nodes[i].m_x);

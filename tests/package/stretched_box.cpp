@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "penalty/fields/potential_field.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/builders.h"
 #include "penalty/mesh/read_surface.h"
 

@@ -71,7 +71,11 @@ template <ElementKind Kind>
 void Batch<Kind>::add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
                               Forces df) const {
   const bool bare = model == StiffnessModel::gauss_newton || model == StiffnessModel::taut;
-  for_each_enabled(x, [&](std::size_t e, auto& s) {
+  for (std::size_t e = 0; e < stencils_.size();
+       ++e) {  // written out: GCC calls a visit of this size, element by element
+    if (is_off(e)) continue;
+    auto&& s = scratch(e);
+    gather(e, x, s.points);
     gather(e, dx, s.vectors);
     const Stencil& stencil = stencils_[e];
     if constexpr (is_structured) {
@@ -86,7 +90,7 @@ void Batch<Kind>::add_product(const Positions& x, StiffnessModel model, const Ve
     } else if (Constraint<Kind> && bare) {
       if constexpr (Constraint<Kind>) {
         const Real c = value_and_gradient(kinds_[e], s.points, s.gradient);
-        if (is_slack(e, c, model)) return;
+        if (is_slack(e, c, model)) continue;
         Real dc = 0;
         for (Eigen::Index k = 0; k < s.gradient.cols(); ++k) dc += s.gradient.col(k).dot(s.vectors.col(k));
         scatter(e, s.gradient, scale * stiffnesses_[e] * dc, df);
@@ -96,7 +100,7 @@ void Batch<Kind>::add_product(const Positions& x, StiffnessModel model, const Ve
           stiffness_matrix(kinds_[e], stiffnesses_[e], s.points, model, profile(e)) * s.vectors.reshaped();
       scatter(e, s.gradient, scale, df);
     }
-  });
+  }
 }
 
 template <ElementKind Kind>
