@@ -7,6 +7,7 @@
 
 #include "penalty/bullet/penalty_soft_body_solver.h"
 #include "penalty/bullet/soft_body.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/builders.h"
 
 int main() {
