@@ -2,8 +2,9 @@
 //
 //   api_sequences [--seed N] [--count N] [--seconds S] [--log]
 //
-// Each has a seed of its own, from --seed on. A failure prints its seed; `--seed N --log` repeats it in this process
-// and prints every call. The status is 0 if nothing was found, 1 if something was, 2 for arguments that make no sense.
+// Runs --count of them (one, unless told), and begins none after --seconds, if these are given. Each has a seed of its
+// own, from --seed on. A failure prints its seed; `--seed N --log` repeats it in this process and prints every call. The
+// status is 0 if nothing was found, 1 if something was, 2 for arguments that make no sense.
 #include "fuzz/sequence.h"
 
 #include <iostream>

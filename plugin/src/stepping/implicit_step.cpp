@@ -151,8 +151,8 @@ void ImplicitStep::minimize() {
 
 // What the minimum, and iterations that end before it, take from the momenta of a free body.
 void ImplicitStep::restore_momenta(const RigidState& before) {
-  Vector3 force = Vector3::Zero(),
-          torque = Vector3::Zero();  // of the potential: only what acts from outside leaves any
+  // Of the potential: only what acts from outside leaves any.
+  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();
   Real forces = 0, torques = 0;
   for (int i = 0; i < particles_.size(); ++i) {
     const Vector3 f = newton_.forces().col(i).head<3>(), arm = newton_.positions().col(i).head<3>() - before.center;
