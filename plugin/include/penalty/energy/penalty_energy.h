@@ -24,13 +24,29 @@ Real deviation(const Kind& kind, const Points<Kind::num_points>& points) {
     return std::sqrt(2 * std::max<Real>(kind.energy(points), 0));
 }
 
+struct StrainAndEnergy {
+  Real strain;  // s = C unless a profile says otherwise
+  Real energy;  // E = K/2 s² [J]
+};
+
+template <ElementKind Kind>
+StrainAndEnergy strain_and_energy(const Kind& kind, Real stiffness, const Points<Kind::num_points>& points,
+                                  const Profile& profile = {}) {
+  if constexpr (ElasticEnergy<Kind>)
+    if (profile.is_plain()) {
+      const Real psi = kind.energy(points);
+      return {std::sqrt(2 * std::max<Real>(psi, 0)), stiffness * psi};
+    }
+  const Real s = profile.strain(deviation(kind, points));
+  return {s, stiffness / 2 * s * s};
+}
+
 /// E [J]: K/2 s² with s = C unless a profile says otherwise.
 template <ElementKind Kind>
 Real energy(const Kind& kind, Real stiffness, const Points<Kind::num_points>& points, const Profile& profile = {}) {
   if constexpr (ElasticEnergy<Kind>)
-    if (profile.is_plain()) return stiffness * kind.energy(points);
-  const Real s = profile.strain(deviation(kind, points));
-  return stiffness / 2 * s * s;
+    if (profile.is_plain()) return stiffness * kind.energy(points);  // without the root
+  return strain_and_energy(kind, stiffness, points, profile).energy;
 }
 
 /// E [J], and dE/dp into `gradient`, which is overwritten [N]: K s dC/dp (seed eq. 2 and 8; eq. 13 and 20 for lengths

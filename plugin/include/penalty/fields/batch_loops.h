@@ -60,8 +60,9 @@ void Batch<Kind>::visit_elements(const Positions& x, const ElementVisitor& visit
     if (view.enabled) {
       auto&& s = scratch(e);
       gather(e, x, s.points);
-      view.strain = profile(e).strain(deviation(kinds_[e], s.points));
-      view.energy = penalty::energy(kinds_[e], stiffnesses_[e], s.points, profile(e));
+      const auto [strain, energy] = strain_and_energy(kinds_[e], stiffnesses_[e], s.points, profile(e));
+      view.strain = strain;
+      view.energy = energy;
     }
     visit(view);
   }
