@@ -1,6 +1,7 @@
 // Random elements of any kind of the list: at rest, stretched, compressed, inverted, somewhere else; of any size and
 // anywhere.
 #pragma once
+#include <sstream>
 #include <stdexcept>
 #include <tuple>
 
@@ -165,7 +166,9 @@ Sample<Kind> sample(unsigned seed) {
 
 template <ElementKind Kind>
 std::string trace(const Sample<Kind>& s) {
-  return std::string(Kind::name) + ", seed " + std::to_string(s.seed) + ", size " + std::to_string(s.size) + " m";
+  std::ostringstream text;
+  text << Kind::name << ", seed " << s.seed << ", size " << s.size << " m";
+  return text.str();
 }
 
 // Sum of the vectors over the sum of their lengths.
