@@ -251,6 +251,7 @@ TEST_P(CoupledIdentity, ACouplingToAGoneBodyIsDroppedInSilence) {
     EXPECT_EQ(penalty.report(left).problem, "");
     if (replaced) {
       EXPECT_THROW(penalty.coupling_field(rope), std::invalid_argument);
+      EXPECT_NO_THROW(penalty.uncouple(rope)) << "as where the entry is still there";
       world.remove(plot.body());
     } else {
       penalty.edit_coupling(rope);

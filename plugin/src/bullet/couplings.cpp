@@ -109,9 +109,12 @@ HeldCoupling& Couplings::get(int number) const {
 }
 
 void Couplings::remove(int number) {
-  const HeldCoupling& gone = get(number);
-  wake(gone);
-  std::erase_if(couplings_, [&](const auto& coupling) { return coupling.get() == &gone; });
+  if (number < 0 || number >= next_number_) get(number);
+  std::erase_if(couplings_, [&](const auto& coupling) {
+    if (coupling->number != number) return false;
+    wake(*coupling);
+    return true;
+  });
 }
 
 void Couplings::remove_all_of(const btSoftBody& body) {

@@ -118,9 +118,10 @@ class AttachedBodies {
   /// appears twice, no soft body at all, or another number of points than the field has particles.
   int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time = 0);
 
-  /// Removes a coupling; its bodies wake in the next step. Detaching a soft body does it by itself. While a rigid body
-  /// of the coupling is not in the world, its soft bodies cannot be stepped; while a soft one is not, the coupling
-  /// rests.
+  /// Removes a coupling; its bodies wake in the next step. Detaching or deleting a soft body does it by itself, and
+  /// nothing is left to do then. While a rigid body of the coupling is not in the world, its soft bodies cannot be
+  /// stepped; while a soft one is not, the coupling rests. Throws std::invalid_argument for a number that `couple` never
+  /// returned.
   void uncouple(int coupling);
   const PotentialField& coupling_field(int coupling) const;
   PotentialField& edit_coupling(int coupling);  // its bodies wake in the next step
