@@ -64,6 +64,31 @@ TEST_P(Sleeping, ActivateWakesIt) {
   EXPECT_GT(lowest(*body), before + 0.1);
 }
 
+// Bullet's islands send a body to sleep in the middle of the step: that step counts.
+TEST_P(Sleeping, WhatIsSentToSleepInFlightWakesFromWhereItsNodesAre) {
+  body->translate(btVector3(0, 5, 0));
+  body->setVelocity(btVector3(2, 0, 0));
+  body->forceActivationState(WANTS_DEACTIVATION);
+  sim.step(frame);
+  ASSERT_EQ(body->getActivationState(), ISLAND_SLEEPING);
+  const auto gap = [&] {
+    Real most = 0;
+    const Particles& particles = sim.penalty().particles(*body);
+    for (int i = 0; i < particles.size(); ++i)
+      most = std::max(most, (to_vector(body->m_nodes[i].m_x) - particles.positions.col(i).head<3>()).norm());
+    return most;
+  };
+  EXPECT_LE(gap(), limit(1e-12, 1e-6));
+
+  body->activate(true);
+  for (int i = 0; i < body->m_nodes.size(); ++i) body->m_nodes[i].m_v.setZero();
+  const Real start = Real(body->m_nodes[0].m_x.y()), side = Real(body->m_nodes[0].m_x.x());
+  sim.step(frame);
+  EXPECT_NEAR(Real(body->m_nodes[0].m_x.y()), start - 9.81 * frame * frame / 2, limit(1e-9, 1e-5)) << "falls from rest";
+  EXPECT_NEAR(Real(body->m_nodes[0].m_x.x()), side, limit(1e-9, 1e-5));
+  EXPECT_LE(gap(), limit(1e-12, 1e-6));
+}
+
 TEST_P(Sleeping, ARigidBodyThatRestsOnItSleepsToo) {
   btSoftBody& table = sim.add_jelly(make_box({0.6, 0.3, 0.6}, {4, 2, 4}),
                                     {.shift = {2, 0.025, 0}, .attach = {.step = {.damping_time = 0.02}}});

@@ -78,8 +78,8 @@ void PenaltyDeformableBodySolver::applyTransforms(btScalar time_step) {
   attached_->thaw_held(bodies);
   for (btSoftBody* body : bodies) {
     HeldBody* held = attached_->bodies->find(*body);
-    if (!held || !body->isActive()) continue;
-    if (held->outcome != StepOutcome::held) {
+    if (!held || held->outcome == StepOutcome::none) continue;
+    if (held->outcome == StepOutcome::stepped) {  // also a body that Bullet's islands have sent to sleep since then
       // The mean velocity was written, so a change of it is what contacts between soft bodies did.
       if (held->nodes.read_velocity_changes(held->stepped.particles, time_step)) held->stepped.positions_changed();
       report_rejected(*held);
