@@ -43,7 +43,7 @@ case " ${readers[*]} sequences allocations " in
 esac
 
 cmake --preset fuzz
-cmake --build --preset fuzz --parallel "$jobs"
+cmake --build --preset fuzz --target fuzz_programs --parallel "$jobs"
 programs=build/fuzz/tests/fuzz
 mkdir -p build/fuzz/corpus build/fuzz/found
 "$programs/write_samples" build/fuzz/corpus

@@ -9,6 +9,10 @@ namespace {
 
 btScalar scalar(Real value) { return static_cast<btScalar>(value); }
 
+Real extent(const Eigen::Matrix3Xd& points) {
+  return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
+}
+
 }  // namespace
 
 const std::vector<Sequence::Operation>& Sequence::operations() {
@@ -166,11 +170,19 @@ AttachOptions Sequence::random_options(Body& body) {
   return options;
 }
 
+// Whether its nodes are so far apart that a field of its rest shape holds more energy than any step can follow.
+bool Sequence::is_torn_apart(const Body& body) {
+  Eigen::Matrix3Xd nodes(3, body.soft->m_nodes.size());
+  for (int i = 0; i < body.soft->m_nodes.size(); ++i) nodes.col(i) = to_vector(body.soft->m_nodes[i].m_x);
+  return extent(nodes) > 10 * extent(body.mesh.vertices);
+}
+
 void Sequence::attach(Body& body, RandomField field, const AttachOptions& options) {
   AttachedBodies& solver = body.home->penalty();
   const bool was_attached = body.attached;
   const bool taken = attempt("attach", [&] { solver.attach(*body.soft, std::move(field.field), options); });
   body.attached = was_attached || taken;
+  body.tangled = body.tangled || (taken && is_torn_apart(body));
   require(solver.is_attached(*body.soft) == body.attached,
           "a call that was refused has attached a body, or detached it");
 }

@@ -43,7 +43,7 @@ class Sequence {
     bool attached = false;
     bool conserves = true;  // its fields keep momentum, and it has no drag
     bool ordinary = true;   // fields, options and nodes are such that it must recover from anything else
-    bool tangled = false;   // nodes were thrown into confusion: a step from there may come to no end
+    bool tangled = false;   // nodes in confusion, or far apart: a step from there may come to no end
     bool stopped = false;   // by the application, through an activation state, or by Bullet, because it was huge
 
     bool in_world() const { return !outside; }
@@ -103,6 +103,7 @@ class Sequence {
   Body* pick_attached();
   RandomField field_for(Body& body);
   AttachOptions random_options(Body& body);
+  static bool is_torn_apart(const Body& body);
   void attach(Body& body, RandomField field, const AttachOptions& options);
   void forget_joints(const Body& body);
   void uncouple_all_of(const Body& body);
@@ -115,6 +116,7 @@ class Sequence {
   // What must hold.
   void advance(Simulation& home, Real duration, int substeps, Real fixed);
   bool is_sound(const Body& body) const;  // all that goes into a step is finite
+  bool shares_a_tangle(const Body& body) const;
   bool keeps_books(const Simulation& home) const;
   Books books(const Simulation& home) const;
   void check_nodes(const Body& body, bool was_sound, bool stepped) const;

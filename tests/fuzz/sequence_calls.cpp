@@ -165,8 +165,9 @@ void Sequence::move_nodes() {
   btSoftBody& soft = *body->soft;
   const int node = chance_.index(soft.m_nodes.size());
   const Real a = chance_.number(-2, 2);
-  say("  " + std::to_string(a));
-  switch (chance_.index(6)) {
+  const int manner = chance_.index(6);
+  say("  manner " + std::to_string(manner) + ", by " + std::to_string(a));
+  switch (manner) {
     case 0:
       soft.m_nodes[node].m_x.setY(scalar(a));
       break;

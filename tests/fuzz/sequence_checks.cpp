@@ -31,6 +31,12 @@ bool Sequence::is_sound(const Body& body) const {
   return true;
 }
 
+// What is coupled, or touches the same rigid body, is stepped together.
+bool Sequence::shares_a_tangle(const Body& body) const {
+  return std::any_of(bodies_.begin(), bodies_.end(),
+                     [&body](const auto& other) { return other->home == body.home && other->tangled; });
+}
+
 bool Sequence::keeps_books(const Simulation& home) const {
   if (!legal() || std::find(called_back_.begin(), called_back_.end(), &home) != called_back_.end()) return false;
   for (const RigidObject& rigid : rigid_)
@@ -115,7 +121,7 @@ void Sequence::check_nodes(const Body& body, bool was_sound, bool stepped) const
               (was_sound ? ", although all that went in was" : ""));
   require(!was_sound || nodes_are_finite(*body.soft), "nodes are not finite, although all that went in was");
   if (!legal()) return;
-  require(body.tangled || body.home->penalty().report(*body.soft).finite,
+  require(shares_a_tangle(body) || body.home->penalty().report(*body.soft).finite,
           "a legal step is reported as not finite: " + body.home->penalty().report(*body.soft).problem);
   if (!stepped || !body.in_world() || body.stopped || depth_ > 0 || !called_back_.empty()) return;
   for (int i = 0; i < particles.size(); ++i) {
