@@ -43,13 +43,9 @@ Nodes::Nodes(btSoftBody& body, Particles& particles) : body_(&body) {
     particles.velocities.col(i).head<3>() = to_vector(node.m_v);
     particles.inverse_masses[i] = node.m_im;
     read_inverse_masses_[i] = node.m_im;
-    remember(i);
+    written_positions_[i] = node.m_x;
+    written_velocities_[i] = node.m_v;
   }
-}
-
-void Nodes::remember(int node) {
-  written_positions_[node] = body_->m_nodes[node].m_x;
-  written_velocities_[node] = body_->m_nodes[node].m_v;
 }
 
 void Nodes::reject(int node, const char* what) {
@@ -77,15 +73,18 @@ NodeChanges Nodes::read(Particles& particles) {
     }
     if (!dx.isZero()) {
       particles.positions.col(i).head<3>() += to_vector(dx);
+      written_positions_[i] = node.m_x;
       changes.moved = true;
     }
-    if (!dv.isZero()) particles.velocities.col(i).head<3>() += to_vector(dv);
+    if (!dv.isZero()) {
+      particles.velocities.col(i).head<3>() += to_vector(dv);
+      written_velocities_[i] = node.m_v;
+    }
     if (node.m_im != read_inverse_masses_[i]) {
       changes.lighter = changes.lighter || node.m_im > read_inverse_masses_[i];
       read_inverse_masses_[i] = node.m_im;
       particles.inverse_masses[i] = node.m_im;
     }
-    remember(i);
   }
   return changes;
 }
@@ -145,11 +144,9 @@ void Nodes::remember_velocities() {
 void Nodes::write(const Particles& particles, Real lead) {
   for (int i = 0; i < particles.size(); ++i) {
     btSoftBody::Node& node = body_->m_nodes[i];
-    node.m_x = to_bullet(particles.positions.col(i));
-    node.m_v = to_bullet(particles.velocities.col(i));
+    written_positions_[i] = node.m_x = to_bullet(particles.positions.col(i));
+    written_velocities_[i] = node.m_vn = node.m_v = to_bullet(particles.velocities.col(i));
     node.m_q = node.m_x - node.m_v * static_cast<btScalar>(lead);
-    node.m_vn = node.m_v;
-    remember(i);
   }
 }
 

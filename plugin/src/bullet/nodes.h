@@ -73,7 +73,6 @@ class Nodes {
   void forget_contacts();
 
  private:
-  void remember(int node);
   void reject(int node, const char* what);
 
   btSoftBody* body_;

@@ -180,7 +180,7 @@ void PotentialField::visit_elements(const Positions& x, const ElementVisitor& vi
       potentials_[k]->visit_elements(x, visit);
     else
       potentials_[k]->visit_elements(x, [&](const ElementView& element) {
-        visit({.stencil = element.stencil, .strain = 0, .energy = 0, .enabled = false});
+        visit({.number = element.number, .stencil = element.stencil, .strain = 0, .energy = 0, .enabled = false});
       });
 }
 

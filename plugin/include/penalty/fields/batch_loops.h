@@ -56,7 +56,8 @@ Real Batch<Kind>::evolve(const Positions& x, Real duration) {
 template <ElementKind Kind>
 void Batch<Kind>::visit_elements(const Positions& x, const ElementVisitor& visit) const {
   for (std::size_t e = 0; e < stencils_.size(); ++e) {
-    ElementView view{.stencil = stencils_[e], .strain = 0, .energy = 0, .enabled = !is_off(e)};
+    ElementView view{
+        .number = static_cast<int>(e), .stencil = stencils_[e], .strain = 0, .energy = 0, .enabled = !is_off(e)};
     if (view.enabled) {
       auto&& s = scratch(e);
       gather(e, x, s.points);

@@ -1,10 +1,10 @@
 // What a solver knows of the elastic world: an energy of the particle positions and its derivatives.
 #pragma once
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "penalty/energy/penalty_energy.h"
 #include "penalty/fields/system.h"
@@ -13,13 +13,28 @@ namespace penalty {
 
 /// One element, as `Potential::visit_elements` shows it.
 struct ElementView {
+  int number;                    // among the elements of its potential
   std::span<const int> stencil;  // its particles
   Real strain;                   // that is resisted: C less target and free play; 0 of a disabled element
   Real energy;                   // [J]
   bool enabled;                  // it counts
 };
 
-using ElementVisitor = std::function<void(const ElementView&)>;
+/// A reference to what is called with each element, for as long as a call takes: owns nothing, allocates nothing.
+class ElementVisitor {
+ public:
+  template <class Call>
+    requires(!std::is_same_v<Call, ElementVisitor> && std::is_invocable_v<const Call&, const ElementView&>)
+  ElementVisitor(const Call& call)  // NOLINT(google-explicit-constructor): stands for the call
+      : call_(&call),
+        invoke_([](const void* callee, const ElementView& element) { (*static_cast<const Call*>(callee))(element); }) {}
+
+  void operator()(const ElementView& element) const { invoke_(call_, element); }
+
+ private:
+  const void* call_;
+  void (*invoke_)(const void*, const ElementView&);
+};
 
 /// A sum of element energies. Calls are virtual once a batch of elements, never per element. Arrays have one column a
 /// particle and are never resized; functions that start with `add_` add to their output. Positions that are not finite
