@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Looks for crashes, undefined behaviour, leaks and broken promises for as long as it is told: every reader under
-# libFuzzer, one after the other, then random sequences of calls and allocations that fail, all built by clang with its
-# address and undefined-behaviour sanitizers.
+# libFuzzer, random sequences of calls and allocations that fail, all built by clang with its address and
+# undefined-behaviour sanitizers.
 #
-#   tests/fuzz/run.sh [--minutes N] [--jobs N] [--seed N] [--only NAME]
+#   tests/fuzz/run.sh [--minutes N | --seconds N] [--jobs N] [--seed N] [--only NAME]
 #
-# --minutes is the time for each of the readers and, for each of Bullet's builds, for the sequences (default 10); --only
-# runs one of vtk, gmsh, tetgen, ply, obj, stl, sequences, allocations. Sequences begin with --seed (default: the time, so
-# that no two runs are the same). Wants clang, and what tests/run.sh installs. What the fuzzers learned stays in
-# build/fuzz/corpus and is where the next run starts; inputs that were found out are kept in build/fuzz/found, and
+# --minutes (default 10) or --seconds is the time for each of the readers and, for each of Bullet's builds, for the sequences;
+# in less than a minute not every allocation fails, but every seventh. As many as there are --jobs run at once; --only runs
+# one of vtk, gmsh, tetgen, ply, obj, stl, sequences, allocations. Sequences begin with --seed (default: the time, so that no
+# two runs are the same). Wants clang, and what tests/run.sh installs. What the fuzzers learned stays in build/fuzz/corpus
+# and is where the next run starts; inputs that were found out are kept in build/fuzz/found, and
 #
 #   build/fuzz/tests/fuzz/fuzz_FORMAT FILE
 #   build/fuzz/tests/fuzz/api_sequences_PRECISION --seed N --log
@@ -19,23 +20,25 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 readers=(vtk gmsh tetgen ply obj stl)
-minutes=10
+duration=600
 jobs=$(nproc)
 seed=$(date +%s)
 only=
 while [ $# -gt 0 ]; do
-  case $1 in
-    --minutes) minutes=${2:-}; shift ;;
-    --jobs) jobs=${2:-}; shift ;;
-    --seed) seed=${2:-}; shift ;;
-    --only) only=${2:-}; shift ;;
-    -h | --help) sed -n '2,18s/^# \{0,1\}//p' tests/fuzz/run.sh; exit 0 ;;
+  option=$1
+  case $option in
+    --minutes | --seconds) duration=${2:-} ;;
+    --jobs) jobs=${2:-} ;;
+    --seed) seed=${2:-} ;;
+    --only) only=${2:-} ;;
+    -h | --help) sed -n '2,20s/^# \{0,1\}//p' tests/fuzz/run.sh; exit 0 ;;
     *) echo "tests/fuzz/run.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
   esac
-  shift || true
-done
-for number in "$minutes" "$jobs" "$seed"; do
-  [[ $number =~ ^[1-9][0-9]*$ ]] || { echo "tests/fuzz/run.sh: '$number' is not a positive number" >&2; exit 2; }
+  shift $(($# > 1 ? 2 : 1))
+  for number in "$duration" "$jobs" "$seed"; do
+    [[ $number =~ ^[1-9][0-9]*$ ]] || { echo "tests/fuzz/run.sh: $option: '$number' is not a positive number" >&2; exit 2; }
+  done
+  [ "$option" != --minutes ] || duration=$((60 * duration))
 done
 case " ${readers[*]} sequences allocations " in
   *" ${only:-vtk} "*) ;;
@@ -51,33 +54,38 @@ mkdir -p build/fuzz/corpus build/fuzz/found
 # Files of the size of a line or two: in memory, where there is such a directory.
 TMPDIR=$(mktemp -d -p "$([ -w /dev/shm ] && echo /dev/shm || echo /tmp)" penalty-fuzz-XXXXXX)
 export TMPDIR
-trap 'rm -rf "$TMPDIR"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$TMPDIR"' EXIT
 
-found=()
+# Begins as soon as a job is free; says what it printed when it is done.
 try() {  # NAME COMMAND...
   local name=$1
   shift
   [ -z "$only" ] || [ "$only" = "${name%%_*}" ] || return 0
-  echo "tests/fuzz/run.sh: $name"
-  "$@" || found+=("$name")
+  while [ "$(jobs -pr | wc -l)" -ge "$jobs" ]; do wait -n || true; done
+  {
+    "$@" >"$TMPDIR/$name.log" 2>&1 || touch "$TMPDIR/$name.found"
+    sed "s/^/$name: /" "$TMPDIR/$name.log"
+  } &
 }
 for reader in "${readers[@]}"; do
   leaks=1  # looked for after each input that may have leaked: Assimp does so often, and is looked at once, at the end
   case $reader in obj | stl) leaks=0 ;; esac
-  try "$reader" "$programs/fuzz_$reader" -max_total_time=$((60 * minutes)) -max_len=4096 -timeout=20 \
+  try "$reader" "$programs/fuzz_$reader" -max_total_time="$duration" -max_len=4096 -timeout=20 \
     -rss_limit_mb=1024 -detect_leaks=$leaks -print_final_stats=1 -print_funcs=0 -verbosity=0 \
     -artifact_prefix="build/fuzz/found/$reader-" "build/fuzz/corpus/$reader"
 done
 for program in "$programs"/api_sequences_*; do
-  try "sequences_${program##*_}" "$program" --seed "$seed" --count 1000000000 --seconds $((60 * minutes))
+  try "sequences_${program##*_}" "$program" --seed "$seed" --count 1000000000 --seconds "$duration"
 done
 for program in "$programs"/nth_allocation_*; do
-  try "allocations_${program##*_}" "$program"
+  try "allocations_${program##*_}" "$program" --stride $((duration < 60 ? 7 : 1))
 done
+wait
 
-if [ ${#found[@]} -eq 0 ]; then
-  echo "tests/fuzz/run.sh: PASSED ($minutes min each, seed $seed, $SECONDS s)"
+found=$(cd "$TMPDIR" && ls -- *.found 2>/dev/null | sed 's/\.found$//' | paste -sd' ' || true)
+if [ -z "$found" ]; then
+  echo "tests/fuzz/run.sh: PASSED ($duration s each, seed $seed, $SECONDS s)"
 else
-  echo "tests/fuzz/run.sh: FAILED (${found[*]}; $minutes min each, seed $seed, $SECONDS s)"
+  echo "tests/fuzz/run.sh: FAILED ($found; $duration s each, seed $seed, $SECONDS s)"
   exit 1
 fi
