@@ -36,16 +36,12 @@ class Opposite {
   bool is_obstacle() const { return rigid_ ? !rigid_->is_dynamic() : mobility_ <= 0; }
 
   Real mobility(const Vector3& direction) const {
-    return rigid_ ? penalty::mobility(*rigid_, arm_, direction) : mobility_ * direction.squaredNorm();
+    return rigid_ ? rigid_->mobility_at(arm_, direction) : mobility_ * direction.squaredNorm();
   }
 
   void push(const Vector3& impulse) const {
     if (rigid_) {
-      const Vector3 moment = arm_.cross(impulse);
-      rigid_->velocity += rigid_->inverse_mass.cwiseProduct(impulse);
-      rigid_->angular_velocity += rigid_->inverse_inertia * moment;
-      rigid_->impulse += impulse;
-      rigid_->angular_impulse += moment;
+      rigid_->push(impulse, arm_);
     } else {
       soft_->step_flows.contacts += impulse.dot(velocity_) + mobility_ / 2 * impulse.squaredNorm();
       side_.point.add_push(impulse, soft_->particles.inverse_masses, soft_->particles.velocities);
@@ -61,11 +57,6 @@ class Opposite {
 };
 
 }  // namespace
-
-Real mobility(const RigidBody& body, const Vector3& arm, const Vector3& direction) {
-  const Vector3 moment = arm.cross(direction);
-  return direction.dot(body.inverse_mass.cwiseProduct(direction)) + moment.dot(body.inverse_inertia * moment);
-}
 
 void sort_contacts(Island& island) {
   const auto before = [](const Contact& l, const Contact& r) { return l.a.body < r.a.body; };

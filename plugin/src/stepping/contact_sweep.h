@@ -31,7 +31,4 @@ bool is_in_contact(const Island& island, std::size_t body);
 /// Puts the contacts in the order of the bodies of their sides a, and remembers where those of each begin.
 void sort_contacts(Island& island);
 
-/// The inverse of the mass that an impulse along `direction` at `arm` from the centre of mass meets.
-Real mobility(const RigidBody& body, const Vector3& arm, const Vector3& direction);
-
 }  // namespace penalty

@@ -42,14 +42,7 @@ Real push(const Side& point, const Vector3& impulse, Island& island) {
   }
   RigidBody& body = island.rigid_bodies[point.rigid];
   if (!body.is_dynamic()) return 0;
-  const Vector3 moment = arm_of(point, island).cross(impulse);
-  const Vector3 dv = body.inverse_mass.cwiseProduct(impulse), dw = body.inverse_inertia * moment;
-  const Real work = impulse.dot(body.velocity + dv / 2) + moment.dot(body.angular_velocity + dw / 2);
-  body.velocity += dv;
-  body.angular_velocity += dw;
-  body.impulse += impulse;
-  body.angular_impulse += moment;
-  return work;
+  return body.push(impulse, arm_of(point, island));
 }
 
 // Of each point a mobility such that the matrix of all of them, which couples points that share particles or a rigid

@@ -4,7 +4,7 @@
 
 namespace penalty {
 
-/// Position, velocity and what the contacts of one step do to them. Zero inverse mass and inertia: a static or
+/// Position, velocity and what contacts and couplings do to them in one step. Zero inverse mass and inertia: a static or
 /// kinematic obstacle, which moves with its velocities and takes no impulse.
 struct RigidBody {
   Vector3 position = Vector3::Zero();          // centre of mass [m]
@@ -15,12 +15,32 @@ struct RigidBody {
   Matrix3 inverse_inertia = Matrix3::Zero();   // world, at `rotation` [1/(kg m²)]
   Vector3 acceleration = Vector3::Zero();      // that acts besides the contacts: gravity, other contacts [m/s²]
 
-  Vector3 impulse = Vector3::Zero();          // of the soft contacts, summed [N s]
+  Vector3 impulse = Vector3::Zero();          // that it was given, summed [N s]
   Vector3 angular_impulse = Vector3::Zero();  // about the centre of mass [N m s]
   Vector3 turn = Vector3::Zero();             // integral of the angular velocity [rad]
 
   bool is_dynamic() const { return !inverse_mass.isZero(0) || !inverse_inertia.isZero(0); }
+
+  /// Of the point at `arm` from the centre of mass, along the world axes [m]: velocity [m/s].
   Vector3 velocity_at(const Vector3& arm) const { return velocity + angular_velocity.cross(arm); }
+
+  /// Change of the velocity at `arm`, along `direction`, by a unit impulse there; times |direction|² [1/kg].
+  Real mobility_at(const Vector3& arm, const Vector3& direction) const {
+    const Vector3 moment = arm.cross(direction);
+    return direction.dot(inverse_mass.cwiseProduct(direction)) + moment.dot(inverse_inertia * moment);
+  }
+
+  /// Gives it an impulse [N s] at `arm`, booked in `impulse` and `angular_impulse`. Returns its work [J].
+  Real push(const Vector3& given, const Vector3& arm) {
+    const Vector3 moment = arm.cross(given);
+    const Vector3 dv = inverse_mass.cwiseProduct(given), dw = inverse_inertia * moment;
+    const Real work = given.dot(velocity + dv / 2) + moment.dot(angular_velocity + dw / 2);
+    velocity += dv;
+    angular_velocity += dw;
+    impulse += given;
+    angular_impulse += moment;
+    return work;
+  }
 
   /// Moves the body for `duration` [s] at its velocities.
   void drift(Real duration);
