@@ -64,6 +64,23 @@ TEST(NotFinite, TheReportedEnergiesAreThoseOfTheStateThatWasKept) {
   EXPECT_EQ(beam.body.report.elastic_energy, beam.field->energy(beam.particles().positions));
 }
 
+TEST(NotFinite, TheSubstepsThatWereOfNoUseAreForgotten) {
+  Body beam = make_beam_body(1);
+  advance(beam, 1.0 / 60);
+  const int usual = beam.body.report.substeps;
+  beam.body.external_forces = PackedVectors::Zero(4, beam.particles().size());
+  beam.body.external_forces(1, 3) = 1e300;
+  beam.body.options.max_substeps = 50 * usual;
+  advance(beam, 1.0 / 60);
+  ASSERT_FALSE(beam.body.report.finite);
+  ASSERT_EQ(beam.body.report.substeps, 50 * usual);
+  beam.body.external_forces(1, 3) = 1;
+  beam.body.positions_changed();
+  advance(beam, 1.0 / 60);
+  EXPECT_TRUE(beam.body.report.finite);
+  EXPECT_LE(beam.body.report.substeps, 2 * usual);
+}
+
 TEST(NotFinite, TheStartIsNotStretchedOverThousandsOfHopelessSubsteps) {
   // More substeps cannot cure a start that is not finite.
   Body beam = make_beam_body(1);

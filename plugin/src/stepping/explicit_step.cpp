@@ -16,25 +16,10 @@ constexpr int most_blocks = 8;        // of substeps, after each of which there 
 constexpr Real retry_growth = 1.5;    // substeps of a repeated step
 constexpr Real substep_memory = 0.8;  // share of the last step's substeps that the next one starts from
 
-// v += time * (f / m + g); a pinned particle keeps its velocity.
-void kick(SteppedBody& body, Real time) {
-  const Real* f = body.forces.data();
-  Real* v = body.particles.velocities.data();
-  const Vector3 dv = time * body.gravity;
-  for (const Real inverse_mass : body.particles.inverse_masses) {
-    if (inverse_mass > 0) {
-      const Real scale = time * inverse_mass;
-      for (int axis = 0; axis < 3; ++axis) v[axis] += scale * f[axis] + dv[axis];
-    }
-    f += 4;
-    v += 4;
-  }
-}
-
-void drift(SteppedBody& body, Real time) { body.particles.positions += time * body.particles.velocities; }
-
-// Both in one pass over the particles.
-void kick_and_drift(SteppedBody& body, Real kick_time, Real drift_time) {
+// v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
+// over the particles.
+template <bool drifts = false>
+void kick(SteppedBody& body, Real kick_time, [[maybe_unused]] Real drift_time = 0) {
   const Real* f = body.forces.data();
   Real* v = body.particles.velocities.data();
   Real* x = body.particles.positions.data();
@@ -44,12 +29,15 @@ void kick_and_drift(SteppedBody& body, Real kick_time, Real drift_time) {
       const Real scale = kick_time * inverse_mass;
       for (int axis = 0; axis < 3; ++axis) v[axis] += scale * f[axis] + dv[axis];
     }
-    for (int axis = 0; axis < 3; ++axis) x[axis] += drift_time * v[axis];
+    if constexpr (drifts)
+      for (int axis = 0; axis < 3; ++axis) x[axis] += drift_time * v[axis];
     f += 4;
     v += 4;
     x += 4;
   }
 }
+
+void drift(SteppedBody& body, Real time) { body.particles.positions += time * body.particles.velocities; }
 
 bool damps(const SteppedBody& body) { return body.options.damping_time > 0 || body.field->damps(); }
 bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupling.field->damps(); }
@@ -99,7 +87,7 @@ class SubCycle {
       for (std::size_t k = 0; k < island_.bodies.size(); ++k) sweep(k, h);
       for (SteppedBody* body : island_.bodies) drift(*body, h);
     } else {
-      for (SteppedBody* body : island_.bodies) kick_and_drift(*body, kick_time, h);
+      for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
     }
     for (RigidBody& body : island_.rigid_bodies) body.drift(h);
     add_driving_work(h / 2);
@@ -305,7 +293,7 @@ void advance_explicitly(Island& island, Real duration) {
     body->report.substeps = step.attempt.substeps;
     body->report.retries = step.retries;
     body->report.finite = step.finite;
-    body->last_substeps = step.attempt.substeps;
+    if (step.finite) body->last_substeps = step.attempt.substeps;
     body->implicit.has_acceleration = false;
   }
   report_contacts(island);
