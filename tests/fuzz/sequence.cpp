@@ -61,7 +61,8 @@ void Sequence::run() {
   }
   make_body();
   make_body();
-  for (int left = 8 + chance_.index(25); left > 0; --left) one_operation(false);
+  constexpr int enough = 10000;  // substeps: few sequences would take most of the time
+  for (int left = 8 + chance_.index(25); left > 0 && substeps_ < enough; --left) one_operation(false);
   mend();
   check_that_all_fall();
 

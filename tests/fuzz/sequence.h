@@ -131,7 +131,8 @@ class Sequence {
   std::vector<RigidObject> rigid_;
   std::vector<Joint> joints_;
   std::vector<const Simulation*> called_back_;
-  int depth_ = 0;  // of steps within steps
+  int depth_ = 0;     // of steps within steps
+  int substeps_ = 0;  // that were taken so far, of all bodies
   std::string found_in_callback_;
 };
 

@@ -101,8 +101,10 @@ void Sequence::advance(Simulation& home, Real duration, int substeps, Real fixed
   if (!found_in_callback_.empty()) throw Finding("in a callback: " + found_in_callback_);
 
   for (const auto& body : bodies_)
-    if (body->home == &home && body->attached)
+    if (body->home == &home && body->attached) {
+      substeps_ += body->home->penalty().report(*body->soft).substeps;
       check_nodes(*body, std::find(sound.begin(), sound.end(), body.get()) != sound.end() && std::isfinite(dt), dt > 0);
+    }
   if (!booked || !called_back_.empty()) return;
   const Books after = books(home);
   const Real tolerance = 1e-8 * (before.size + after.size + impulse.norm());
