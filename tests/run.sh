@@ -1,25 +1,29 @@
 #!/usr/bin/env bash
-# Installs what is missing, checks the format, builds and runs all tests. Works on a bare Debian 12 or 13, as root or with sudo.
+# Installs what is missing, checks the format, builds and runs all tests; then fuzzes for some seconds (tests/fuzz/run.sh) and
+# lints for two minutes (tests/tidy.sh). Works on a bare Debian 12 or 13, as root or with sudo.
 #
-#   tests/run.sh [--preset NAME] [--jobs N] [--no-install] [-- CTEST_ARGUMENT...]
+#   tests/run.sh [--preset NAME] [--jobs N] [--no-install] [--tests-only] [-- CTEST_ARGUMENT...]
 #
-# Presets: release, debug, asan-ubsan, tsan, float64, werror, clang.
-# --no-install leaves the packages alone. `tests/run.sh -- -R mesh` runs only the tests whose names contain "mesh". The last
-# line printed is the verdict; the status is 0 if everything passed, 1 if not, 2 for arguments that make no sense.
+# Presets: release, debug, asan-ubsan, tsan, float64, werror, clang. Only a release is fuzzed and linted, and not with
+# --tests-only or CTEST_ARGUMENTs: `tests/run.sh -- -R mesh` runs the tests whose names contain "mesh". --no-install leaves the
+# packages alone. The last line printed is the verdict; the status is 0 if everything passed, 1 if not, 2 for arguments
+# that make no sense.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 preset=release
 jobs=$(nproc)
 install=yes
+whole=yes
 ctest_arguments=()
 while [ $# -gt 0 ]; do
   case $1 in
     --preset) preset=${2:-}; shift ;;
     --jobs) jobs=${2:-}; shift ;;
     --no-install) install=no ;;
+    --tests-only) whole=no ;;
     --) shift; ctest_arguments=("$@"); break ;;
-    -h | --help) sed -n '2,8s/^# \{0,1\}//p' tests/run.sh; exit 0 ;;
+    -h | --help) sed -n '2,11s/^# \{0,1\}//p' tests/run.sh; exit 0 ;;
     *) echo "tests/run.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
   esac
   shift || true
@@ -28,9 +32,11 @@ if ! grep -q "\"name\": \"$preset\", \"configurePreset\"" CMakePresets.json; the
   echo "tests/run.sh: unknown preset '$preset'; there are: $(sed -n '/"buildPresets"/,/\]/s/.*"name": "\([^"]*\)".*/\1/p' CMakePresets.json | paste -sd' ')" >&2
   exit 2
 fi
+[ "$preset" = release ] && [ ${#ctest_arguments[@]} -eq 0 ] || whole=no
 [[ $jobs =~ ^[1-9][0-9]*$ ]] || { echo "tests/run.sh: --jobs is '$jobs', must be a positive number" >&2; exit 2; }
 
 stage="starting"
+testing="testing with $jobs jobs"
 log=$(mktemp)
 finish() {
   local status=$?
@@ -39,7 +45,7 @@ finish() {
   rm -f "$log"
   if [ "$status" -eq 0 ]; then
     echo "tests/run.sh: PASSED ($preset, ${summary##*out of } tests, $SECONDS s)"
-  elif [ -n "$summary" ]; then
+  elif [ "$stage" = "$testing" ] && [ -n "$summary" ]; then
     echo "tests/run.sh: FAILED ($preset, $summary, $SECONDS s)"
     exit 1
   else
@@ -56,10 +62,10 @@ step() {
 
 if [ "$install" = yes ]; then
   step "installing packages"
-  case $preset in
-    clang) bash third_party_notes/install.sh tests clang ;;
-    *) bash third_party_notes/install.sh tests ;;
-  esac
+  packages=(tests)
+  if [ $whole = yes ] || [ "$preset" = clang ]; then packages+=(clang); fi
+  if [ $whole = yes ]; then packages+=(tidy); fi
+  bash third_party_notes/install.sh "${packages[@]}"
 fi
 step "checking the format"
 bash tests/format.sh
@@ -67,6 +73,11 @@ step "configuring build/$preset"
 cmake --preset "$preset" -D BULLET_PENALTY_BUILD_TESTS=ON -D BULLET_PENALTY_BUILD_DEMOS=ON
 step "building with $jobs jobs"
 cmake --build --preset "$preset" --parallel "$jobs"
-step "testing with $jobs jobs"
+step "$testing"
 # A software renderer would otherwise start a thread for each core, in each of the parallel tests.
 LP_NUM_THREADS=1 ctest --preset "$preset" --parallel "$jobs" --no-tests=error "${ctest_arguments[@]}" 2>&1 | tee "$log"
+[ $whole = yes ] || exit 0
+step "fuzzing with sanitizers"
+bash tests/fuzz/run.sh --seconds 15 --seed 1 --jobs "$jobs"
+step "linting"
+bash tests/tidy.sh --minutes 2 --no-install --jobs "$jobs"

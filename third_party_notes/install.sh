@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# third_party_notes/install.sh demos | tests [clang] | tidy: installs the Debian packages that the demos, the tests (with clang as
-# the compiler) or tests/tidy.sh need and that are not there yet. Needs root, or sudo, only if something is missing. This is
-# the one place that lists the packages; README.md beside it says what each of them is.
+# third_party_notes/install.sh demos | tests [clang] [tidy]: installs the Debian packages that the demos need, or the tests with
+# clang as a compiler and clang-tidy for tests/tidy.sh, and that are not there yet. Needs root, or sudo, only if
+# something is missing. This is the one place that lists the packages; README.md beside it says what each of them is.
 set -euo pipefail
 say() { echo "install.sh: $*"; }
 
@@ -12,13 +12,15 @@ tests=(libbenchmark-dev parallel clang-format-19)
 where_offered=(libosmesa6)  # Mesa gave it up in version 25.1: where it is gone, the demos draw with EGL
 
 wanted=("${build[@]}" "${demos[@]}")
-case "$*" in
-  demos) ;;
-  tests) wanted+=("${tests[@]}") ;;
-  "tests clang") wanted+=("${tests[@]}" clang) ;;
-  tidy) wanted+=("${tests[@]}" clang-tidy-19) ;;
-  *) echo "usage: $0 demos | tests [clang] | tidy" >&2; exit 2 ;;
-esac
+for what in "${@:-nothing}"; do
+  case $what in
+    demos) ;;
+    tests) wanted+=("${tests[@]}") ;;
+    clang) wanted+=(clang libclang-rt-dev) ;;
+    tidy) wanted+=(clang-tidy-19) ;;
+    *) echo "usage: $0 demos | tests [clang] [tidy]" >&2; exit 2 ;;
+  esac
+done
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   say "not a Debian system: nothing is installed. Needed, by their Debian names: ${wanted[*]}"
