@@ -68,10 +68,12 @@ try() {  # NAME COMMAND...
   } &
 }
 for reader in "${readers[@]}"; do
-  leaks=1  # looked for after each input that may have leaked: Assimp does so often, and is looked at once, at the end
-  case $reader in obj | stl) leaks=0 ;; esac
+  leaks=1 memory=1024  # [MB]
+  # Leaks are looked for after each input that may have leaked. Assimp does so with every other broken file: it is looked at
+  # once, at the end, and may pile up what it has lost.
+  case $reader in obj | stl) leaks=0 memory=16384 ;; esac
   try "$reader" "$programs/fuzz_$reader" -max_total_time="$duration" -max_len=4096 -timeout=20 \
-    -rss_limit_mb=1024 -detect_leaks=$leaks -print_final_stats=1 -print_funcs=0 -verbosity=0 \
+    -rss_limit_mb=$memory -malloc_limit_mb=1024 -detect_leaks=$leaks -print_final_stats=1 -print_funcs=0 -verbosity=0 \
     -artifact_prefix="build/fuzz/found/$reader-" "build/fuzz/corpus/$reader"
 done
 for program in "$programs"/api_sequences_*; do
