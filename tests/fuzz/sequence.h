@@ -116,7 +116,7 @@ class Sequence {
   // What must hold.
   void advance(Simulation& home, Real duration, int substeps, Real fixed);
   bool is_sound(const Body& body) const;  // all that goes into a step is finite
-  bool shares_a_tangle(const Body& body) const;
+  void spread_tangles(const Simulation& home);
   bool keeps_books(const Simulation& home) const;
   Books books(const Simulation& home) const;
   void check_nodes(const Body& body, bool was_sound, bool stepped) const;

@@ -32,9 +32,10 @@ bool Sequence::is_sound(const Body& body) const {
 }
 
 // What is coupled, or touches the same rigid body, is stepped together.
-bool Sequence::shares_a_tangle(const Body& body) const {
-  return std::any_of(bodies_.begin(), bodies_.end(),
-                     [&body](const auto& other) { return other->home == body.home && other->tangled; });
+void Sequence::spread_tangles(const Simulation& home) {
+  const bool any = std::any_of(bodies_.begin(), bodies_.end(),
+                               [&home](const auto& body) { return body->home == &home && body->tangled; });
+  for (const auto& body : bodies_) body->tangled = body->tangled || (any && body->home == &home);
 }
 
 bool Sequence::keeps_books(const Simulation& home) const {
@@ -100,6 +101,7 @@ void Sequence::advance(Simulation& home, Real duration, int substeps, Real fixed
   --depth_;
   if (!found_in_callback_.empty()) throw Finding("in a callback: " + found_in_callback_);
 
+  spread_tangles(home);
   for (const auto& body : bodies_)
     if (body->home == &home && body->attached) {
       substeps_ += body->home->penalty().report(*body->soft).substeps;
@@ -123,7 +125,7 @@ void Sequence::check_nodes(const Body& body, bool was_sound, bool stepped) const
               (was_sound ? ", although all that went in was" : ""));
   require(!was_sound || nodes_are_finite(*body.soft), "nodes are not finite, although all that went in was");
   if (!legal()) return;
-  require(shares_a_tangle(body) || body.home->penalty().report(*body.soft).finite,
+  require(body.tangled || body.home->penalty().report(*body.soft).finite,
           "a legal step is reported as not finite: " + body.home->penalty().report(*body.soft).problem);
   if (!stepped || !body.in_world() || body.stopped || depth_ > 0 || !called_back_.empty()) return;
   for (int i = 0; i < particles.size(); ++i) {
