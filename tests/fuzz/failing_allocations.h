@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "math/sanitizers.h"
+
 namespace penalty::testing {
 
 class FailingAllocations {
@@ -37,12 +39,7 @@ class FailingAllocations {
 
 }  // namespace penalty::testing
 
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define PENALTY_TEST_HAS_ASAN
-#endif
-#endif
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(PENALTY_TEST_HAS_ASAN)
+#if defined(__GLIBC__) && !defined(PENALTY_TEST_SANITIZED)
 extern "C" {
 void* __libc_malloc(std::size_t size);                 // NOLINT: glibc's name
 void* __libc_realloc(void* memory, std::size_t size);  // NOLINT

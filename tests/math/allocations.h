@@ -4,9 +4,11 @@
 #include <cstdlib>
 #include <new>
 
+#include "math/sanitizers.h"
+
 static std::atomic<long> num_allocations{0};
 
-#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__GLIBC__) && !defined(PENALTY_TEST_SANITIZED)
 // Eigen calls malloc itself, and operator new ends there too.
 extern "C" void* __libc_malloc(std::size_t size);
 extern "C" void* malloc(std::size_t size) noexcept {

@@ -70,8 +70,9 @@ TEST_F(ReadMesh, ClaimsBeyondTheFileCostNothing) {
   };
   const long memory = peak_memory_kib();
   const auto start = std::chrono::steady_clock::now();
-  for (const auto& [name, contents] : files) {
-    const std::string complaint = mesh_error([&] { read_mesh(write(name, contents)); });
+  for (const auto& file : files) {
+    const std::string& name = file.first;
+    const std::string complaint = mesh_error([&] { read_mesh(write(name, file.second)); });
     EXPECT_EQ(complaint.substr(0, name.size()), name) << complaint;
     EXPECT_EQ(complaint.find('\n'), complaint.npos) << complaint;
   }
