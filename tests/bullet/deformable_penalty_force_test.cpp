@@ -229,7 +229,7 @@ TEST_P(StockDeformable, TheEnergyIsThatOfTheField) {
 
 TEST_P(StockDeformable, TwoForcesAreNotMerged) {
   DeformablePenaltyForce soft, stiff;
-  EXPECT_NE(soft.getForceType(), stiff.getForceType());
+  EXPECT_NE(static_cast<int>(soft.getForceType()), static_cast<int>(stiff.getForceType()));
   btSoftBody &first = add(moved(ball, {-2, 0, 0})), &second = add(moved(ball, {2, 0, 0}));
   soft.attach(first, make_elastic_field(ball.vertices, ball.tetrahedra, 1.0));
   stiff.attach(second, make_elastic_field(ball.vertices, ball.tetrahedra, 16.0));

@@ -16,9 +16,9 @@ namespace penalty {
 namespace {
 
 // Beyond Bullet's own ids: addForce merges forces of equal type.
-btDeformableLagrangianForceType next_force_type() {
+int next_force_type() {
   static std::atomic<int> next{1000};
-  return static_cast<btDeformableLagrangianForceType>(next++);
+  return next++;
 }
 
 }  // namespace

@@ -51,7 +51,9 @@ class DeformablePenaltyForce final : public btDeformableLagrangianForce {
   double totalElasticEnergy(btScalar time_step) override;
   double totalDampingEnergy(btScalar time_step) override;
   double totalEnergy(btScalar time_step) override;
-  btDeformableLagrangianForceType getForceType() override { return type_; }
+  btDeformableLagrangianForceType getForceType() override {
+    return static_cast<btDeformableLagrangianForceType>(type_);
+  }
 
  private:
   struct Attached;
@@ -59,7 +61,7 @@ class DeformablePenaltyForce final : public btDeformableLagrangianForce {
   template <class Function>
   void for_each_active(const Function& function) noexcept;
 
-  btDeformableLagrangianForceType type_;
+  int type_;  // of this force alone
   Real damping_time_;
   std::vector<std::unique_ptr<Attached>> attached_;
 };
