@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "render/leaks_of_mesa.h"
+
 namespace penalty::test {
 
 /// A directory of its own, gone at the end.
@@ -47,7 +49,9 @@ struct Outcome {
 inline Outcome run_program(const std::string& program, const std::vector<std::string>& arguments,
                            const std::string& environment = "") {
   const TemporaryDirectory directory;
-  std::string command = environment + " '" + program + "'";
+  std::ofstream(directory / "leaks") << leaks_of_mesa;
+  std::string command = "LSAN_OPTIONS=suppressions=" + (directory / "leaks").string() + ":print_suppressions=0 " +
+                        environment + " '" + program + "'";
   for (const std::string& argument : arguments) command += " '" + argument + "'";
   command += " >" + (directory / "out").string() + " 2>" + (directory / "err").string() + " </dev/null";
   const int status = std::system(command.c_str());
