@@ -77,7 +77,7 @@ PotentialField& AttachedBodies::edit(const btSoftBody& body) {
   held.stepped.positions_changed();
   return held.field;
 }
-int AttachedBodies::couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time) {
+int AttachedBodies::couple(const std::vector<CouplingPoint>& points, PotentialField field, Real damping_time) {
   return attached_->couplings.add(*attached_->bodies, points, std::move(field), damping_time);
 }
 void AttachedBodies::uncouple(int coupling) { attached_->couplings.remove(coupling); }

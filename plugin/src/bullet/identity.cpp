@@ -19,7 +19,8 @@ SerialNumber serial_of(const btCollisionObject& object) {
 }
 
 SerialNumber give_serial(btCollisionObject& object) {
-  if (serial_of(object) == 0) object.internalSetExtensionPointer(reinterpret_cast<void*>(next_serial()));
+  if (serial_of(object) == 0)
+    object.internalSetExtensionPointer(reinterpret_cast<void*>(next_serial()));  // NOLINT(performance-no-int-to-ptr)
   return serial_of(object);
 }
 

@@ -134,9 +134,10 @@ Vector3 BccLattice::position(Id vertex) const {
   const Id number = vertex / 2;
   const Real half = vertex % 2 == 0 ? 0.5 : 0;
   Vector3 place;
-  place[c] = number % (cells_[c] + 1);
-  place[b] = number / (cells_[c] + 1) % (cells_[b] + 1);
-  place[a] = number / (cells_[c] + 1) / (cells_[b] + 1);
+  const Id row = number / (cells_[c] + 1), layer = row / (cells_[b] + 1);
+  place[c] = static_cast<Real>(number % (cells_[c] + 1));
+  place[b] = static_cast<Real>(row % (cells_[b] + 1));
+  place[a] = static_cast<Real>(layer);
   return origin_ + size_ * (place.array() + half).matrix();
 }
 

@@ -90,7 +90,7 @@ ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
     if (contact.radius > 0 && !offset.isZero(0)) normal = offset.normalized();
     const Real gap = normal.dot(offset) - contact.radius;
     contact.depth = std::max(contact.depth, -gap);
-    const Vector3 obstacle_velocity = opposite.velocity();
+    const Vector3& obstacle_velocity = opposite.velocity();
     const Vector3 relative = point.of(particles.velocities) - obstacle_velocity;
     const Real normal_speed = normal.dot(relative);
 

@@ -116,7 +116,7 @@ class AttachedBodies {
   /// positions those of the field. Rigid bodies get the reaction. Returns the number of the coupling. Throws
   /// std::invalid_argument for a body that is not attached, a node outside it, a rigid body in no world, a point that
   /// appears twice, no soft body at all, or another number of points than the field has particles.
-  int couple(std::vector<CouplingPoint> points, PotentialField field, Real damping_time = 0);
+  int couple(const std::vector<CouplingPoint>& points, PotentialField field, Real damping_time = 0);
 
   /// Removes a coupling; its bodies wake in the next step. Detaching or deleting a soft body does it by itself, and
   /// nothing is left to do then. While a rigid body of the coupling is not in the world, its soft bodies cannot be

@@ -33,8 +33,9 @@ template <class Kind, class List>
 inline constexpr std::size_t index_in = 0;
 template <class Kind, class... Kinds>
 inline constexpr std::size_t index_in<Kind, KindList<Kinds...>> = [] {
+  const bool is_there[] = {std::is_same_v<Kind, Kinds>...};
   std::size_t index = 0;
-  (void)((std::is_same_v<Kind, Kinds> || (++index, false)) || ...);
+  while (index < sizeof...(Kinds) && !is_there[index]) ++index;
   return index;
 }();
 
