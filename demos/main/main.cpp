@@ -21,7 +21,7 @@ enum Status { done = 0, failed = 1, misused = 2, not_finite = 3 };
 std::optional<std::ofstream> open_summary(const RunOptions& options) {
   if (!options.summary || *options.summary == "-") return {};
   std::ofstream file(*options.summary);
-  if (!file) throw UsageError("--summary " + *options.summary + ": cannot be written");
+  if (!file) throw UsageError("--summary " + options.summary.value_or("") + ": cannot be written");
   return file;
 }
 
@@ -68,7 +68,7 @@ void hand_out(const nlohmann::ordered_json& summary, const std::string& descript
   if (!options.summary) std::cout << description << std::flush;
   if (options.out && !(std::ofstream(*options.out / "summary.json") << text << std::flush))
     throw UsageError("--out " + options.out->string() + ": summary.json cannot be written");
-  if (file && !*file) throw UsageError("--summary " + *options.summary + ": cannot be written");
+  if (file && !*file) throw UsageError("--summary " + options.summary.value_or("") + ": cannot be written");
 }
 
 Status run_figures(const SceneEntry& entry, const RunOptions& options) {
@@ -98,45 +98,48 @@ Status run(RunOptions options) {
   if (options.out) make_directory(*options.out);
 
   // Of several runs the worst is described and drawn.
-  std::optional<Recording> worst;
   const int runs = std::max(options.seeds, 1);
   int recovered = 0;
   nlohmann::ordered_json each_seed = nlohmann::ordered_json::array();
-  {
+  const Recording worst = [&] {
     Progress progress(options.scene, steps * runs);
-    for (int r = 0; r < runs; ++r) {
+    const auto run_once = [&](int r) {
       const std::unique_ptr<Scene> scene = enter_world(entry, options, body);
       Recording recording =
           record(*scene, options, steps, frames, [&](long step) { progress.advance_to(r * steps + step); });
       recovered += recording.recovered();
       each_seed.push_back(
           {{"seed", recording.seed}, {"rest_error", recording.rest_error}, {"recovered", recording.recovered()}});
-      if (!worst || worse(recording, *worst)) worst = std::move(recording);
       ++options.scene_options.seed;
-    }
-  }
+      return recording;
+    };
+    Recording worst_so_far = run_once(0);
+    for (int r = 1; r < runs; ++r)
+      if (Recording other = run_once(r); worse(other, worst_so_far)) worst_so_far = std::move(other);
+    return worst_so_far;
+  }();
 
-  nlohmann::ordered_json summary = summarize(*worst, options, body);
+  nlohmann::ordered_json summary = summarize(worst, options, body);
   if (options.seeds > 0) {
     summary["runs"] = runs;
     summary["recovered_runs"] = recovered;
     summary["each_seed"] = each_seed;
   }
-  hand_out(summary, describe(summary, worst->facts), options, summary_file);
+  hand_out(summary, describe(summary, worst.facts), options, summary_file);
   if (options.out) {
-    write_csv(*options.out / "energies.csv", worst->steps);
-    write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, worst->steps);
+    write_csv(*options.out / "energies.csv", worst.steps);
+    write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, worst.steps);
   }
 
   if (draws) {
-    Progress progress("drawing", static_cast<long>(worst->frames.size()) + 1);
-    options.scene_options.seed = worst->seed;
-    const std::string remarks = draw(*worst, options, entry.setup(options.scene_options, body), frames, *options.out,
+    Progress progress("drawing", static_cast<long>(worst.frames.size()) + 1);
+    options.scene_options.seed = worst.seed;
+    const std::string remarks = draw(worst, options, entry.setup(options.scene_options, body), frames, *options.out,
                                      [&](long drawn) { progress.advance_to(drawn); });
     if (!remarks.empty()) std::cerr << "penalty-demo: " << remarks << '\n';
   }
-  if (!worst->finite) {
-    std::cerr << "penalty-demo: " << worst->failure << '\n';
+  if (!worst.finite) {
+    std::cerr << "penalty-demo: " << worst.failure << '\n';
     return not_finite;
   }
   return done;

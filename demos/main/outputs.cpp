@@ -54,6 +54,7 @@ void write_csv(const std::filesystem::path& path, const std::vector<StepRecord>&
 void write_energy_plot(const std::filesystem::path& path, const std::string& title,
                        const std::vector<StepRecord>& steps) {
   std::vector<double> time;
+  time.reserve(steps.size());
   for (const StepRecord& step : steps) time.push_back(step.time);
   render::Plot plot{.title = title, .x_label = "time [s]", .y_label = "energy [J]", .series = {}};
   const auto add = [&](const std::string& name, auto get) {

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <cstdio>
 
 namespace penalty::demo {
@@ -26,7 +27,7 @@ void Progress::advance_to(long done) {
   const double share = static_cast<double>(done) / static_cast<double>(total_), left = elapsed / share - elapsed;
   if (elapsed + left < 2 || (elapsed < 0.5 && !drawn_)) return;
   last_ = now;
-  const auto seconds_left = static_cast<long>(left + 0.5);
+  const auto seconds_left = std::lround(left);
   char time[32];
   std::snprintf(time, sizeof time, "%ld:%02ld", seconds_left / 60, seconds_left % 60);
   if (terminal_) {

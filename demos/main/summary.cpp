@@ -17,6 +17,7 @@ Json number(const std::optional<Real>& value) { return value ? number(*value) : 
 template <class Get>
 std::vector<Real> column(const std::vector<StepRecord>& steps, Get get) {
   std::vector<Real> values;
+  values.reserve(steps.size());
   for (const StepRecord& step : steps) values.push_back(static_cast<Real>(get(step)));
   return values;
 }

@@ -48,7 +48,7 @@ void Canvas::vertical_ramp(float x, float y, float w, float h, ColorMap map) {
   }
 }
 
-void Canvas::line(Eigen::Vector2f from, Eigen::Vector2f to, float thickness, const Paint& paint) {
+void Canvas::line(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float thickness, const Paint& paint) {
   curve({from, to}, thickness, paint);
 }
 

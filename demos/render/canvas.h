@@ -38,7 +38,7 @@ class Canvas {
   void rectangle(float x, float y, float w, float h, const Paint& paint);
   /// Colours run from bottom to top.
   void vertical_ramp(float x, float y, float w, float h, ColorMap map);
-  void line(Eigen::Vector2f from, Eigen::Vector2f to, float thickness, const Paint& paint);
+  void line(const Eigen::Vector2f& from, const Eigen::Vector2f& to, float thickness, const Paint& paint);
   void curve(const std::vector<Eigen::Vector2f>& points, float thickness, const Paint& paint);
   /// (x, y): on the base line.
   void text(float x, float y, std::string_view utf8, const Paint& paint, Align align = Align::left,
