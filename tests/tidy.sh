@@ -43,7 +43,7 @@ mapfile -t sources < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' build/tidy/c
 total=${#sources[@]}
 deadline=$((minutes ? $(date +%s) + 60 * minutes : 1 << 40))
 if [ -n "$minutes" ]; then
-  mapfile -t sources < <({ git log --max-count=100 --format= --name-only 2>/dev/null | sed "s|^|$PWD/|"
+  mapfile -t sources < <({ git log --max-count=100 --format= --name-only 2>/dev/null | sed "s|^|$PWD/|" || true
                            printf '%s\n' "${sources[@]}"; } | awk '!seen[$0]++' |
                          grep -Fxf <(printf '%s\n' "${sources[@]}"))
 fi
