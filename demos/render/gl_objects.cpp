@@ -64,7 +64,7 @@ void set_attribute(const GlApi& gl, GLuint index, int components, int stride, in
   gl.enable_vertex_attrib_array(index);
   const auto bytes = static_cast<std::uintptr_t>(offset) * sizeof(float);
   gl.vertex_attrib_pointer(index, components, GL_FLOAT, GL_FALSE, stride * static_cast<int>(sizeof(float)),
-                           reinterpret_cast<const void*>(bytes));
+                           reinterpret_cast<const void*>(bytes));  // NOLINT(performance-no-int-to-ptr): OpenGL's way
   gl.vertex_attrib_divisor(index, per_instance ? 1 : 0);
 }
 

@@ -106,6 +106,7 @@ bool VideoWriter::start() {
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   std::vector<std::string> words = arguments(true);
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   const int error = posix_spawnp(&process_, argv[0], &actions, nullptr, argv.data(), environ);
@@ -169,9 +170,9 @@ void VideoWriter::fail(const std::string& what) {
   wait();
   std::string said;
   if (messages_) {
-    std::rewind(messages_);
     std::array<char, 1024> buffer{};
-    said.assign(buffer.data(), std::fread(buffer.data(), 1, buffer.size(), messages_));
+    if (std::fseek(messages_, 0, SEEK_SET) == 0)
+      said.assign(buffer.data(), std::fread(buffer.data(), 1, buffer.size(), messages_));
   }
   throw std::runtime_error(options_.ffmpeg + " " + what + " while writing " + path_.string() +
                            (said.empty() ? "" : ": " + said));

@@ -17,6 +17,7 @@ PotentialField reference_field(const TetMesh& mesh, Real cell) {
   PotentialField field(mesh.vertices);
   const std::vector<Edge> edges = edges_of(mesh.tetrahedra);
   std::vector<Real> stiffnesses;
+  stiffnesses.reserve(edges.size());
   for (const auto& [a, b] : edges)
     stiffnesses.push_back(0.4 * young * cell * (mesh.vertices.col(b) - mesh.vertices.col(a)).squaredNorm());
   field.add<Length>(edges, stiffnesses);

@@ -91,7 +91,8 @@ Status execute(const StabilityCommand& command) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const Status status = std::visit([](auto&& command) { return execute(std::move(command)); }, parse(argc, argv));
+  const Status status =
+      std::visit([](auto&& command) { return execute(std::forward<decltype(command)>(command)); }, parse(argc, argv));
   if (!std::cout) throw demo::UsageError("standard output cannot be written");
   return status;
 } catch (const demo::UsageError& error) {

@@ -27,6 +27,7 @@ void run_suite(const std::vector<StudyCase>& cases, const StudyMeshes& meshes, i
   };
   {
     std::vector<std::jthread> threads;
+    threads.reserve(static_cast<std::size_t>(jobs));
     for (int job = 0; job < jobs; ++job) threads.emplace_back(work);
   }
   if (failure) std::rethrow_exception(failure);

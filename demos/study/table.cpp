@@ -66,6 +66,7 @@ std::vector<TableRow> table_rows(const std::vector<StudyResult>& results) {
   std::map<decltype(key_of(results.front())), std::vector<const StudyResult*>> groups;
   for (const StudyResult& result : results) groups[key_of(result)].push_back(&result);
   std::vector<TableRow> rows;
+  rows.reserve(groups.size());
   for (const auto& [key, group] : groups) rows.push_back(row_of(group));
   return rows;
 }

@@ -287,6 +287,7 @@ struct Eigen::NumTraits<penalty::Jet<D, O>> : Eigen::NumTraits<penalty::Real> {
   using NonInteger = penalty::Jet<D, O>;
   using Nested = penalty::Jet<D, O>;
   using Literal = penalty::Real;
+  // NOLINTNEXTLINE(readability-identifier-naming): Eigen's names
   enum { RequireInitialization = 1, ReadCost = 1 + D, AddCost = 1 + D, MulCost = 3 * (1 + D) };
 };
 template <int D, int O, class Operation>
