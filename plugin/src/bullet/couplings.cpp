@@ -66,6 +66,8 @@ void check_points(const HeldBodies& bodies, const std::vector<CouplingPoint>& po
     throw std::invalid_argument("couple: none of the " + std::to_string(points.size()) + " points is of a soft body");
 }
 
+[[noreturn]] void refuse(int number) { throw std::invalid_argument("there is no coupling " + std::to_string(number)); }
+
 void activate(const HeldPoint& point) {
   if (point.soft) point.soft->body->activate(true);
   if (point.rigid) point.rigid->activate();
@@ -105,11 +107,11 @@ int Couplings::add(const HeldBodies& bodies, const std::vector<CouplingPoint>& p
 HeldCoupling& Couplings::get(int number) const {
   for (const auto& coupling : couplings_)
     if (coupling->number == number) return *coupling;
-  throw std::invalid_argument("there is no coupling " + std::to_string(number));
+  refuse(number);
 }
 
 void Couplings::remove(int number) {
-  if (number < 0 || number >= next_number_) get(number);
+  if (number < 0 || number >= next_number_) refuse(number);
   std::erase_if(couplings_, [&](const auto& coupling) {
     if (coupling->number != number) return false;
     wake(*coupling);
