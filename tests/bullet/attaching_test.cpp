@@ -122,6 +122,7 @@ PotentialField field_of_links(const btSoftBody& body, Real stiffness) {
   Eigen::Matrix3Xd rest(3, body.m_nodes.size());
   for (int i = 0; i < body.m_nodes.size(); ++i) rest.col(i) = to_vector(body.m_nodes[i].m_x);
   std::vector<std::array<int, 2>> edges;
+  edges.reserve(body.m_links.size());
   for (int l = 0; l < body.m_links.size(); ++l)
     edges.push_back({static_cast<int>(body.m_links[l].m_n[0] - &body.m_nodes[0]),
                      static_cast<int>(body.m_links[l].m_n[1] - &body.m_nodes[0])});

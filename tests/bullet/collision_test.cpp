@@ -115,6 +115,7 @@ TEST_P(Collision, TwoSoftBodiesHittingOneRigidBodyKeepTheMomentum) {
 TEST_P(Collision, AChainOfSoftAndRigidBodiesKeepsTheMomentum) {
   const TetMesh ball = make_ball(0.3, 2);
   std::vector<btSoftBody*> balls;
+  balls.reserve(3);
   for (int k = 0; k < 3; ++k) balls.push_back(&sim.add_jelly(ball, {.shift = {1.2 * k, 0, 0}}));
   for (int k = 0; k < 2; ++k) sim.add_box({0.25, 0.25, 0.25}, 0.5, {1.2 * k + 0.6, 0, 0});
   for (int i = 0; i < balls[0]->m_nodes.size(); ++i) balls[0]->m_nodes[i].m_v = btVector3(3, 0, 0);

@@ -212,9 +212,9 @@ TEST_P(Attachments, HoldAPointBetweenNodes) {
 TEST_P(Attachments, RefuseWhatCannotBeAndSayWhich) {
   btSoftBody& body = sim.add_jelly(make_box({1, 1, 1}, {1, 1, 1}));
   btRigidBody& box = sim.add_box({0.1, 0.1, 0.1}, 1, {0, 3, 0});
-  const auto refusal = [&](std::vector<CouplingPoint> points, int particles) {
+  const auto refusal = [&](const std::vector<CouplingPoint>& points, int particles) {
     return complaint<std::invalid_argument>(
-        [&] { sim.penalty().couple(std::move(points), PotentialField(Eigen::Matrix3Xd::Zero(3, particles))); });
+        [&] { sim.penalty().couple(points, PotentialField(Eigen::Matrix3Xd::Zero(3, particles))); });
   };
   const CouplingPoint node = CouplingPoint::at_node(body, 0), rigid = CouplingPoint::on(box, {0, 0, 0});
   EXPECT_EQ(refusal({node, rigid}, 3), "couple: the field has 3 particles for 2 points");

@@ -170,7 +170,7 @@ TEST_P(Refused, NodesThatAreNoNumbers) {
   const auto attaching = [&](const auto& spoil) {
     btSoftBody& body = add_ball();
     spoil(body.m_nodes[3]);
-    const std::string what = refusal([&] { sim.penalty().attach(body, field()); });
+    std::string what = refusal([&] { sim.penalty().attach(body, field()); });
     EXPECT_FALSE(sim.penalty().is_attached(body));
     sim.remove(body);
     return what;

@@ -15,6 +15,7 @@ constexpr btScalar inf = std::numeric_limits<btScalar>::infinity();
 
 std::vector<Vector3> places_of(const btSoftBody& body) {
   std::vector<Vector3> places;
+  places.reserve(body.m_nodes.size());
   for (int i = 0; i < body.m_nodes.size(); ++i) places.push_back(to_vector(body.m_nodes[i].m_x));
   return places;
 }

@@ -21,7 +21,7 @@
 
 namespace penalty::demo {
 
-void PrintTo(WorldKind kind, std::ostream* out);
+void PrintTo(WorldKind kind, std::ostream* out);  // NOLINT(readability-identifier-naming): googletest's name
 
 }  // namespace penalty::demo
 

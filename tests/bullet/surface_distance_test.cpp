@@ -29,7 +29,8 @@ Real revolved_distance(const Vector3& p, const std::vector<Eigen::Vector2d>& pro
   const Eigen::Vector2d q(std::hypot(p.x(), p.z()), p.y());
   Real nearest = 1e9, outside = -1e9;
   for (std::size_t k = 0; k + 1 < profile.size(); ++k) {
-    const Eigen::Vector2d a = profile[k], edge = profile[k + 1] - a;
+    const Eigen::Vector2d& a = profile[k];
+    const Eigen::Vector2d edge = profile[k + 1] - a;
     const Real t = std::clamp((q - a).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
     nearest = std::min(nearest, (q - a - t * edge).norm());
     outside = std::max(outside, Eigen::Vector2d(edge.y(), -edge.x()).dot(q - a));
@@ -186,6 +187,7 @@ class Mesh {
 
 Mesh box_mesh(const Vector3& half, Real margin) {
   std::vector<Vector3> vertices;
+  vertices.reserve(8);
   for (int corner = 0; corner < 8; ++corner)
     vertices.emplace_back(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
                           corner & 4 ? half.z() : -half.z());

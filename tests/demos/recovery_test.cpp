@@ -1,4 +1,5 @@
 // Back to the rest shape at 60 Hz in Bullet's worlds. Compiled for both precisions of Bullet.
+#include <cmath>
 #include <thread>
 
 #include "recovery.h"
@@ -28,7 +29,7 @@ SceneOptions box(Start start, std::uint32_t seed = 1) {
 
 /// Steps for `duration` [s]; false as soon as something is not finite.
 bool run(Scene& scene, Real duration) {
-  for (int step = 0; step < static_cast<int>(duration / frame + 0.5); ++step) {
+  for (int step = 0; step < std::lround(duration / frame); ++step) {
     scene.step(frame);
     if (!scene.report().finite) return false;
   }
@@ -110,6 +111,7 @@ TEST_P(Recovery, ComesToTheSameBitsInEveryThread) {
   EXPECT_NE(first, second);
   std::uint64_t hashes[4];
   std::vector<std::thread> threads;
+  threads.reserve(4);
   for (std::uint32_t k = 0; k < 4; ++k) threads.emplace_back([&, k] { hashes[k] = hash_after_a_second(1 + k % 2); });
   for (std::thread& thread : threads) thread.join();
   for (std::uint32_t k = 0; k < 4; ++k) EXPECT_EQ(hashes[k], k % 2 == 0 ? first : second);

@@ -122,6 +122,7 @@ TEST(StaticRecovery, ComesToTheSameBitsOnAnyNumberOfThreads) {
   const auto hashes_on = [](std::size_t threads) {
     std::vector<std::uint64_t> hashes(runs);
     std::vector<std::thread> workers;
+    workers.reserve(threads);
     for (std::size_t t = 0; t < threads; ++t)
       workers.emplace_back([&hashes, t, threads] {
         for (std::size_t run = t; run < runs; run += threads)

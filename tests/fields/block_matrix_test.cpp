@@ -36,6 +36,7 @@ TEST(BlockMatrix, ProductIsThatOfTheDenseMatrix) {
     Random random(seed);
     const int particles = 7;
     std::vector<std::pair<int, int>> pattern;
+    pattern.reserve(15);
     for (int k = 0; k < 15; ++k)
       pattern.emplace_back(static_cast<int>(random.index(particles)), static_cast<int>(random.index(particles)));
     BlockMatrix a(particles, pattern);

@@ -146,6 +146,7 @@ TEST(Hinges, AreTheInnerEdgesOfASurfaceEachOnceAndInOrder) {
     }();
     const auto edges_of_hinges = [](const std::vector<Hinge>& hinges) {
       std::vector<Edge> edges;
+      edges.reserve(hinges.size());
       for (const auto& [p0, p1, p2, p3] : hinges) edges.push_back({p0, p1});
       return edges;
     };

@@ -33,7 +33,7 @@ void limit_cpu(double seconds) {
 }
 
 void report(const IsolationOptions& options, std::uint64_t number, const std::string& what) {
-  std::cerr << options.name << ' ' << number << ": " << what << std::endl;
+  std::cerr << options.name << ' ' << number << ": " << what << '\n';
 }
 
 std::string death(int status) {

@@ -224,7 +224,7 @@ bool try_all(long most, long stride) {
 }  // namespace
 }  // namespace penalty::testing
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   const auto arguments = penalty::testing::read_arguments(argc, argv, {{"--most", 300}, {"--stride", 1}},
                                                           "usage: nth_allocation [--most N] [--stride N]");
   if (!arguments || arguments->at("--stride") < 1) return 2;
@@ -232,4 +232,7 @@ int main(int argc, char** argv) {
                                    static_cast<long>(arguments->at("--stride")))
              ? 0
              : 1;
+} catch (const std::exception& error) {
+  std::cerr << "nth_allocation: " << error.what() << '\n';
+  return 1;
 }

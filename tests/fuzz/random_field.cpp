@@ -54,6 +54,7 @@ RandomField random_field(Chance& chance, const TetMesh& mesh, const UserFault& f
   PotentialField& field = made.field;
   const Real stiffness = chance.number(0.1, 1e2);
   std::vector<Triangle> corners;
+  corners.reserve(tetrahedra.size());
   for (const Tetrahedron& t : tetrahedra) corners.push_back({t[0], t[1], t[2]});
   switch (sort) {
     case 5:

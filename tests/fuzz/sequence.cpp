@@ -111,7 +111,7 @@ bool Sequence::attempt(const char* call, const std::function<void()>& act) {
 }
 
 void Sequence::say(const std::string& text) const {
-  if (log_) std::cerr << text << std::endl;
+  if (log_) std::cerr << text << '\n';
 }
 
 Sequence::Body* Sequence::pick_body() { return bodies_.empty() ? nullptr : chance_.pick(bodies_).get(); }

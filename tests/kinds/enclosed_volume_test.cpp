@@ -41,6 +41,7 @@ Surface octahedron() {
 // Every triangle into four, new points on the unit sphere.
 Surface refined(const Surface& coarse) {
   std::vector<Vector3> points;
+  points.reserve(coarse.points.cols());
   for (Eigen::Index i = 0; i < coarse.points.cols(); ++i) points.emplace_back(coarse.points.col(i));
   std::map<std::pair<int, int>, int> middles;
   const auto middle = [&](int a, int b) {

@@ -17,23 +17,23 @@ template <class... Kinds, template <class> class Keep>
 struct TypesThat<KindList<Kinds...>, Keep> {
   template <class... Types>
   static ::testing::Types<Types...> listed(std::tuple<Types...>);
-  using type = decltype(listed(
+  using Type = decltype(listed(
       std::tuple_cat(std::declval<std::conditional_t<Keep<Kinds>::value, std::tuple<Kinds>, std::tuple<>>>()...)));
 };
 
 template <class Kind>
 struct Any : std::true_type {};
-using KindTypes = TypesThat<OwnKinds, Any>::type;
+using KindTypes = TypesThat<OwnKinds, Any>::Type;
 
 /// Constraints of few points: what the chain rule makes dense matrices of.
 template <class Kind>
 struct IsFixedConstraint : std::bool_constant<Constraint<Kind> && Kind::num_points != dynamic> {};
-using ConstraintTypes = TypesThat<OwnKinds, IsFixedConstraint>::type;
+using ConstraintTypes = TypesThat<OwnKinds, IsFixedConstraint>::Type;
 
 /// Those that nothing outside holds.
 template <class Kind>
 struct IsInternal : std::bool_constant<IsFixedConstraint<Kind>::value && conserves_momentum<Kind>> {};
-using InternalTypes = TypesThat<OwnKinds, IsInternal>::type;
+using InternalTypes = TypesThat<OwnKinds, IsInternal>::Type;
 
 enum class Shape { noisy, stretched, compressed, inverted, anywhere };
 inline constexpr unsigned num_shapes = 5;
@@ -196,7 +196,8 @@ std::vector<Points<N>> degenerate_points(int count, Real size) {
   for (int k = 0; k < count; ++k) {
     coincident.col(k) = Vector3(1, 2, 3);
     collinear.col(k) = k * Vector3(1, -1, 0.5);
-    coplanar.col(k) = Vector3(k % 2, k / 2, 0);
+    const int column = k % 2, row = k / 2;
+    coplanar.col(k) = Vector3(column, row, 0);
     all_but_one.col(k) = k == 0 ? Vector3(1, 0, 0) : Vector3(0, 0, 0);
   }
   return {size * coincident, size * collinear, size * coplanar, size * all_but_one, 0 * coincident};

@@ -39,6 +39,7 @@ Sample sample(unsigned seed, Group group = Group::solid) {
   Points<dynamic> points = random.rotation() * change * rest + random.vectors<dynamic>(n, seed % 5 == 4 ? 1.0 : 0.1);
   points.colwise() += random.vector(2);
   std::vector<Real> weights;
+  weights.reserve(n);
   for (int i = 0; i < n; ++i) weights.push_back(random.uniform(0.5, 3));
   const Real size = std::pow(10.0, random.uniform(-3, 3));
   return {size * rest, size * points, weights, ShapeMatch(weights).at_rest(size * rest), size};
@@ -73,7 +74,7 @@ bool is_thin(const Sample& s, Group group) {
 
 Points<dynamic> cube() {
   Points<dynamic> p(3, 8);
-  for (int i = 0; i < 8; ++i) p.col(i) = Vector3(i & 1, i / 2 & 1, i / 4);
+  for (int i = 0; i < 8; ++i) p.col(i) = Vector3(i & 1, i >> 1 & 1, i >> 2);
   return p;
 }
 
@@ -325,6 +326,7 @@ TEST(ShapeMatch, DampingKeepsBothMomentaAndEndsInRigidMotion) {
       Random random(seed + 2000);
       const auto n = p.cols();
       std::vector<Real> inverse;
+      inverse.reserve(n);
       for (Eigen::Index i = 0; i < n; ++i) inverse.push_back(random.uniform(0.3, 3));
       Points<dynamic> v = random.vectors<dynamic>(n, 1);
       const auto before = momenta(p, v, inverse);

@@ -64,7 +64,7 @@ TEST(StableNeoHookean, GradientIsTheDerivativeOfTheEnergy) {
     const Real energy = kind.energy_and_gradient(s.points, gradient);
     ASSERT_GT(gradient.norm() * s.size, 0.01);
     together.see(std::abs(energy - kind.energy(s.points)) / (1 + energy), seed);
-    const auto value = [&kind = kind](const Points<4>& p) { return kind.energy(p); };
+    const auto value = [&material = kind](const Points<4>& p) { return material.energy(p); };
     error.see(relative_error(central_difference_gradient<4>(value, s.points, s.difference_step()), gradient), seed);
   }
   error.expect_below(1e-7, "relative error");
@@ -77,9 +77,9 @@ TEST(StableNeoHookean, HessianIsTheDerivativeOfTheGradient) {
     const auto [s, kind] = element(seed);
     const Hessian<4> hessian = kind.energy_hessian(s.points);
     ASSERT_GT(hessian.norm() * s.size * s.size, 0.01) << trace(s);
-    const auto gradient = [&kind = kind](const Points<4>& p) {
+    const auto gradient = [&material = kind](const Points<4>& p) {
       Gradient<4> g;
-      kind.energy_and_gradient(p, g);
+      material.energy_and_gradient(p, g);
       return g;
     };
     error.see(relative_error(central_difference_hessian<4>(gradient, s.points, s.difference_step()), hessian), seed);

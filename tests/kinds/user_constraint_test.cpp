@@ -284,6 +284,7 @@ TEST(UserConstraint, CarriesWhatItsCallableCaptures) {
   const Vector3 ground(0, 0, 1);
   const auto prototype = differentiated_constraint<1>([ground](const auto& p) { return p.col(0).dot(ground); });
   std::vector<std::remove_const_t<decltype(prototype)>> many;
+  many.reserve(10);
   for (int k = 0; k < 10; ++k) many.push_back(prototype.at_rest(Points<1>(0, 0, k)));
   for (int k = 0; k < 10; ++k) EXPECT_EQ(many[k].value(Points<1>(5, 5, 10)), 10 - k);
 }

@@ -10,7 +10,7 @@ static std::atomic<long> num_allocations{0};
 
 #if defined(__GLIBC__) && !defined(PENALTY_TEST_SANITIZED)
 // Eigen calls malloc itself, and operator new ends there too.
-extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: glibc's name
 extern "C" void* malloc(std::size_t size) noexcept {
   ++num_allocations;
   return __libc_malloc(size);

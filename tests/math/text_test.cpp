@@ -2,9 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <limits>
 
 #include "random.h"
@@ -32,15 +33,14 @@ TEST(NumberText, ExactTextIsShortAndReadsBackAsTheSameDouble) {
   int finite = 0;
   for (int i = 0; i < 20000; ++i) {
     const std::uint64_t bits = random();
-    Real value;
-    std::memcpy(&value, &bits, sizeof value);
+    const auto value = std::bit_cast<Real>(bits);
     if (!std::isfinite(value)) continue;
     ++finite;
     const std::string text = exact_text(value);
     Real back = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), back);
     ASSERT_TRUE(error == std::errc() && end == text.data() + text.size()) << text;
-    EXPECT_EQ(std::memcmp(&back, &value, sizeof value), 0) << text;
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(back), bits) << text;
   }
   EXPECT_GT(finite, 19000);
 }

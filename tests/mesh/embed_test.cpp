@@ -231,7 +231,7 @@ TEST(BccLattice, NeighboursShareAFaceAndEveryFaceHasANeighbour) {
 TEST(TriangleTouchesTetrahedron, KnowsTouchingCrossingAndApart) {
   Points<4> corner;
   corner << 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1;
-  const auto touches = [&](Vector3 a, Vector3 b, Vector3 c) {
+  const auto touches = [&](const Vector3& a, const Vector3& b, const Vector3& c) {
     Points<3> triangle;
     triangle << a, b, c;
     return triangle_touches_tetrahedron(triangle, corner, 1e-12);

@@ -26,6 +26,7 @@ Body make_stretched_cube(Real stiffness) {
 Body make_chain(int links, Real stiffness) {
   Eigen::Matrix3Xd rest(3, links + 1);
   std::vector<Edge> edges;
+  edges.reserve(links);
   for (int i = 0; i <= links; ++i) rest.col(i) = Vector3(0, -0.1 * i, 0);
   for (int i = 0; i < links; ++i) edges.push_back({i, i + 1});
   PotentialField field(rest);
@@ -218,6 +219,7 @@ TEST(ImplicitStep, GivesBackTheSpinThatBackwardEulerTakesAndNoMore) {
     Body cube = converged(make_stretched_cube(1));
     const std::vector<Vector3> before = [&] {
       std::vector<Vector3> v;
+      v.reserve(cube.particles().size());
       for (int i = 0; i < cube.particles().size(); ++i) v.push_back(cube.velocity(i));
       return v;
     }();

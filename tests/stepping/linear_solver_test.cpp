@@ -25,6 +25,7 @@ struct Problem {
   void add_term(unsigned seed, Real coefficient) {
     Random random(seed);
     std::vector<int> everyone;
+    everyone.reserve(x.cols());
     for (int i = 0; i < x.cols(); ++i) everyone.push_back(i);
     system.matrix.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(x.cols(), 1));
   }

@@ -83,6 +83,7 @@ TEST(Relax, BalancesLoadsAgainstPins) {
   Eigen::Matrix3Xd rest(3, 5);
   std::vector<Edge> edges;
   for (int i = 0; i < 5; ++i) rest.col(i) = Vector3(0, -0.2 * i, 0);
+  edges.reserve(4);
   for (int i = 0; i < 4; ++i) edges.push_back({i, i + 1});
   PotentialField field(rest);
   field.add<Length>(edges, 30);

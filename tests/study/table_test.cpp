@@ -99,8 +99,9 @@ TEST(RecoveryWatch, ForgetsARecoveryThatDidNotLast) {
   watch.see(0.009, {4, 0.4});
   watch.see(0.001, {5, 0.5});
   ASSERT_TRUE(watch.since());
-  EXPECT_EQ(watch.since()->progress, 4);
-  EXPECT_EQ(watch.since()->cpu_seconds, 0.4);
+  const auto since = watch.since().value_or(RecoveryWatch::Moment{});
+  EXPECT_EQ(since.progress, 4);
+  EXPECT_EQ(since.cpu_seconds, 0.4);
   watch.see(std::numeric_limits<Real>::quiet_NaN(), {6, 0.6});
   EXPECT_FALSE(watch.since());
 }
