@@ -58,10 +58,20 @@ lint() {
 }
 export -f lint
 export deadline done tidy
-# Each finding once, although a header is seen by many sources.
+# Each finding once, although a header is seen by many sources, and at once.
+once() {
+  declare -A seen
+  local show= line
+  while IFS= read -r line; do
+    if [[ $line =~ ^/.*:\ (warning|error):\  ]]; then
+      show=${seen[$line]-yes}
+      seen[$line]=
+    fi
+    [ -z "$show" ] || printf '%s\n' "$line"
+  done
+}
 passed=yes
-printf '%s\0' "${sources[@]}" | xargs -0 -n 1 -P "$jobs" bash -c 'lint "$0"' |
-  awk '/^\/.*: (warning|error): / { show = !seen[$0]++ } show { print; fflush() }' | tee "$log" || passed=no
+printf '%s\0' "${sources[@]}" | xargs -0 -n 1 -P "$jobs" bash -c 'lint "$0"' | once | tee "$log" || passed=no
 linted="$(wc -l <"$done") of $total sources, $SECONDS s"
 if [ $passed = yes ] && ! [ -s "$log" ]; then
   echo "tests/tidy.sh: PASSED ($linted)"
