@@ -22,16 +22,9 @@ class Candidates final : public btBroadphaseAabbCallback {
 
   bool process(const btBroadphaseProxy* proxy) override {
     auto* object = static_cast<btCollisionObject*>(proxy->m_clientObject);
-    if (object->getInternalType() == btCollisionObject::CO_SOFT_BODY || !object->hasContactResponse()) return true;
-    if (object->getCollisionShape()->isSoftBody()) return true;
-    if (body_.m_collisionDisabledObjects.findLinearSearch(object) != body_.m_collisionDisabledObjects.size())
+    if (object->getInternalType() == btCollisionObject::CO_SOFT_BODY || object->getCollisionShape()->isSoftBody())
       return true;
-    if (!object->checkCollideWith(&body_) || !body_.checkCollideWith(object)) return true;
-    if (const btBroadphaseProxy* own = body_.getBroadphaseHandle())
-      if (!(proxy->m_collisionFilterGroup & own->m_collisionFilterMask) ||
-          !(own->m_collisionFilterGroup & proxy->m_collisionFilterMask))
-        return true;
-    objects.push_back(object);
+    if (may_collide(*object, body_)) objects.push_back(object);
     return true;
   }
 
@@ -62,6 +55,16 @@ Box bounds_of(const btCollisionObject& object) {
   btVector3 low, high;
   object.getCollisionShape()->getAabb(object.getWorldTransform(), low, high);
   return {to_vector(low), to_vector(high)};
+}
+
+bool may_collide(const btCollisionObject& object, const btSoftBody& body) {
+  if (!object.hasContactResponse() || !object.checkCollideWith(&body) || !body.checkCollideWith(&object)) return false;
+  const auto& disabled = body.m_collisionDisabledObjects;
+  if (disabled.findLinearSearch(&object) != disabled.size()) return false;
+  const btBroadphaseProxy *one = object.getBroadphaseHandle(), *two = body.getBroadphaseHandle();
+  return !one || !two ||
+         ((one->m_collisionFilterGroup & two->m_collisionFilterMask) != 0 &&
+          (two->m_collisionFilterGroup & one->m_collisionFilterMask) != 0);
 }
 
 std::vector<btCollisionObject*> obstacles_near(btSoftBody& body, const Box& box, Real padding) {

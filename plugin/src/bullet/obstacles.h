@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "penalty/math/types.h"
+#include "penalty/contact/box.h"
 
 class btCollisionObject;
 class btSoftBody;
@@ -13,25 +13,10 @@ struct HeldBody;
 class RigidBodies;
 struct WorldIsland;
 
-/// An axis-aligned box; empty until a point is added.
-struct Box {
-  Vector3 low = Vector3::Constant(std::numeric_limits<Real>::infinity());
-  Vector3 high = -low;
-
-  void add(const Vector3& p) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  bool overlaps(const Box& other, Real padding) const {
-    return ((low.array() - padding) <= other.high.array()).all() &&
-           ((other.low.array() - padding) <= high.array()).all();
-  }
-  bool contains(const Vector3& p, Real padding) const {
-    return ((low.array() - padding) <= p.array()).all() && ((high.array() + padding) >= p.array()).all();
-  }
-};
-
 Box bounds_of(const btCollisionObject& object);
+
+/// Whether the soft body may touch the object as far as Bullet's filters, flags and lists say.
+bool may_collide(const btCollisionObject& object, const btSoftBody& body);
 
 /// The objects whose boxes overlap that of the soft body, padded [m], and which it may touch, in the order in which
 /// they came into the world.
