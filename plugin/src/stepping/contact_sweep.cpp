@@ -5,8 +5,8 @@
 namespace penalty {
 namespace {
 
-constexpr Real depth_decay_time = 0.05;          // [s]
-constexpr Real largest_depth_correction = 0.01;  // share of the depth a sweep takes back
+constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
+constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
 
 /// Side b of a contact at this instant, seen from the point of side a.
 class Opposite {
@@ -40,12 +40,10 @@ class Opposite {
   }
 
   void push(const Vector3& impulse) const {
-    if (rigid_) {
+    if (rigid_)
       rigid_->push(impulse, arm_);
-    } else {
-      soft_->step_flows.contacts += impulse.dot(velocity_) + mobility_ / 2 * impulse.squaredNorm();
+    else
       side_.point.add_push(impulse, soft_->particles.inverse_masses, soft_->particles.velocities);
-    }
   }
 
  private:
@@ -94,12 +92,11 @@ ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
     const Vector3 relative = point.of(particles.velocities) - obstacle_velocity;
     const Real normal_speed = normal.dot(relative);
 
-    if (-gap > slop && opposite.is_obstacle()) {
-      const Real share = std::min(largest_depth_correction, duration / depth_decay_time);
-      point.add_push(normal * (share * (-gap - slop) / point_mobility), particles.inverse_masses, particles.positions);
-    }
-
-    const Real wanted = gap > 0 ? -gap / duration : 0;
+    Real wanted = -gap / duration;
+    if (gap <= 0)
+      wanted = opposite.is_obstacle()
+                   ? std::clamp<Real>((-gap - slop) / std::max(recovery_time, duration), 0, recovery_speed)
+                   : 0;
     if (normal_speed >= wanted) continue;
     const Real normal_impulse = (wanted - normal_speed) / (point_mobility + opposite.mobility(normal));
     Vector3 impulse = normal_impulse * normal;
@@ -112,13 +109,13 @@ ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
     }
 
     contact.impulse = impulse;
-    const Vector3 point_velocity = relative + obstacle_velocity;
-    const Real on_particles = impulse.dot(point_velocity) + point_mobility / 2 * impulse.squaredNorm();
-    work.particles += on_particles;
-    work.loss += impulse.dot(obstacle_velocity) - opposite.mobility(impulse) / 2 - on_particles;
+    const Real recovery = std::max<Real>(normal_impulse * wanted, 0);  // as of an obstacle that moves so fast
+    work.outside += recovery;
+    work.loss +=
+        recovery - impulse.dot(relative) - (point_mobility * impulse.squaredNorm() + opposite.mobility(impulse)) / 2;
     point.add_push(impulse, particles.inverse_masses, particles.velocities);
     if (opposite.is_obstacle())
-      work.obstacles += impulse.dot(obstacle_velocity);
+      work.outside += impulse.dot(obstacle_velocity);
     else
       opposite.push(-impulse);
   }

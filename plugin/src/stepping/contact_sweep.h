@@ -6,17 +6,16 @@ namespace penalty {
 
 /// What a sweep did to energy [J].
 struct ContactWork {
-  Real obstacles = 0;  // by bodies that move but take no impulse
-  Real particles = 0;  // on the particles of the sides a
-  Real loss = 0;       // to impact and friction
+  Real outside = 0;  // by bodies that move but take no impulse, and of taking depth back
+  Real loss = 0;     // to impact and friction
 };
 
 /// One sweep over the contacts of body `body` of the island at positions that are about to drift for `duration` h [s].
 /// Of the gap g and the relative normal speed u the sweep asks u >= -g/h while the gap is open and u >= 0 when it is
-/// closed: it stops approach, and never pushes out by velocity. The impulse goes to side a and, with the opposite sign,
-/// to side b: to a rigid body at the point of a, so that both momenta are kept to round-off. Friction is clipped to
-/// Coulomb's cone. Depth beyond the slop of the body against bodies that cannot move is taken back by position, one per
-/// cent a sweep.
+/// closed: it stops approach. Depth beyond the slop of the body against what cannot move is taken back: there it asks
+/// u >= depth / 0.05 s, at most half a metre a second, and what that gives is work from outside. The impulse goes to side a and,
+/// with the opposite sign, to side b: to a rigid body at the point of a, so that both momenta are kept to round-off.
+/// Friction is clipped to Coulomb's cone.
 ContactWork solve_contacts(Island& island, std::size_t body, Real duration);
 
 /// The contacts whose side a belongs to body number `body`.
@@ -25,7 +24,7 @@ inline std::span<Contact> contacts_of(Island& island, std::size_t body) {
   return {island.contacts.data() + begin, island.contacts_begin[body + 1] - begin};
 }
 
-/// Some contact has particles of this body on one of its sides.
+/// Some contact has particles of this body on one of its sides. Surfaces are not asked.
 bool is_in_contact(const Island& island, std::size_t body);
 
 /// Puts the contacts in the order of the bodies of their sides a, and remembers where those of each begin.

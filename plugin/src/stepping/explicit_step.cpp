@@ -8,6 +8,7 @@
 #include "coupling.h"
 #include "energy_guard.h"
 #include "stepped_body.h"
+#include "surface_contacts.h"
 
 namespace penalty {
 namespace {
@@ -45,8 +46,9 @@ bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupl
 /// The substeps of one step of an island.
 class SubCycle {
  public:
-  SubCycle(Island& island, Real duration) : island_(island), duration_(duration) {
-    has_contacts_ = !island.contacts.empty();
+  SubCycle(Island& island, SurfaceContacts& surfaces, Real duration)
+      : island_(island), surfaces_(surfaces), duration_(duration) {
+    has_contacts_ = !island.contacts.empty() || !surfaces.is_empty();
     for (const SteppedBody* body : island_.bodies) {
       has_blocks_ = has_blocks_ || damps(*body) || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
@@ -63,6 +65,7 @@ class SubCycle {
     const int per_block = (substeps + blocks - 1) / blocks;
     const Real h = duration_ / (blocks * per_block);
     outside_work_ = 0;
+    remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) body->step_flows = {};
     for (int block = 0; block < blocks; ++block) {
       Real kick_time = h / 2;
@@ -72,23 +75,30 @@ class SubCycle {
       }
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
+      if (!surfaces_.is_empty()) solve_contacts(0, [&] { surfaces_.close(h, [this, h] { sweep(h); }); });
       if (has_blocks_) end_block(duration_ / blocks);
     }
     return blocks * per_block;
   }
 
-  Real outside_work() const { return outside_work_; }  // of obstacles and driven particles [J]
+  Real outside_work() const { return outside_work_; }  // of obstacles, of driven particles, of taking depth back [J]
 
  private:
   void substep(Real kick_time, Real h) {
     kick_others(kick_time);
     if (has_contacts_) {
       for (SteppedBody* body : island_.bodies) kick(*body, kick_time);
-      for (std::size_t k = 0; k < island_.bodies.size(); ++k) sweep(k, h);
+      // Since the last drift there was a whole kick, be it in halves.
+      if (surfaces_.is_empty())
+        solve_contacts(h, [&] { sweep(h); });
+      else
+        solve_contacts(h, [&] { surfaces_.sweep(h, remaining_, [this, h] { sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
+      surfaces_.drifted(h);
     } else {
       for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
     }
+    remaining_ -= h;
     for (RigidBody& body : island_.rigid_bodies) body.drift(h);
     add_driving_work(h / 2);
     for (SteppedBody* body : island_.bodies) evaluate_forces(*body);
@@ -96,32 +106,37 @@ class SubCycle {
     add_driving_work(h / 2);
   }
 
-  void sweep(std::size_t k, Real h) {
-    SteppedBody& body = *island_.bodies[k];
-    const ContactWork work = solve_contacts(island_, k, h);
-    outside_work_ += work.obstacles;
-    // A kick and the contacts after it are one change of velocity, whose work is that of each part at the mean of the
-    // velocities before and after. What the sweep takes for its own lies too far on the side of the kick: where a
-    // particle is pressed against the ground and stays at rest, all of it. Since the last drift there was a whole kick,
-    // be it in halves.
-    Real shared = 0;
-    for (const Contact& contact : contacts_of(island_, k))
-      if (!contact.impulse.isZero(0)) {
-        shared += shared_work(body, contact.a.point, contact.impulse, h);
-        if (contact.b.is_rigid()) continue;
-        SteppedBody& other = *island_.bodies[contact.b.body];
-        const Real of_other = shared_work(other, contact.b.point, -contact.impulse, h);
-        other.step_flows.contacts -= of_other;
-        other.step_flows.contact_loss += of_other;
-      }
-    body.step_flows.contacts += work.particles - shared;
-    body.step_flows.contact_loss += work.loss + shared;
+  // Once over the contacts with rigid bodies.
+  void sweep(Real h) {
+    for (std::size_t k = 0; k < island_.bodies.size(); ++k) {
+      const ContactWork work = penalty::solve_contacts(island_, k, h);
+      outside_work_ += work.outside;
+      island_.bodies[k]->step_flows.contact_loss += work.loss;
+    }
   }
 
-  static Real shared_work(const SteppedBody& body, const WeightedPoint& point, const Vector3& impulse, Real h) {
-    Real work = 0;
-    for (int k = 0; k < point.size; ++k) work += point.weights[k] * kick_work(body, point.particles[k], impulse, h);
-    return work;
+  // Books what contacts, by whatever sweeps, made of the velocities. A kick and the contacts after it are one change of
+  // velocity, whose work is that of each part at the mean of the velocities before and after. What contacts change lies
+  // too far on the side of the kick: where a particle is pressed against the ground and stays at rest, all of it.
+  template <class Solve>
+  void solve_contacts(Real kick_time, const Solve& solve) {
+    for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
+    solve();
+    for (SteppedBody* body : island_.bodies) {
+      const Particles& particles = body->particles;
+      Real work = 0, shared = 0;
+      for (int i = 0; i < particles.size(); ++i) {
+        const Real mass = inverse_or_zero(particles.inverse_masses[i]);
+        if (mass == 0) continue;
+        const Vector3 before = body->before_contacts.col(i).head<3>();
+        const Vector3 change = particles.velocities.col(i).head<3>() - before;
+        if (change.isZero(0)) continue;
+        work += mass * change.dot(before + change / 2);
+        shared += kick_work(*body, i, mass * change, kick_time);
+      }
+      body->step_flows.contacts += work - shared;
+      body->step_flows.contact_loss += shared;
+    }
   }
 
   // Rigid bodies, by what acts on them, and everything that is coupled, by the couplings.
@@ -174,7 +189,8 @@ class SubCycle {
   }
 
   Island& island_;
-  Real duration_;
+  SurfaceContacts& surfaces_;
+  Real duration_, remaining_ = 0;
   bool has_contacts_ = false, has_blocks_ = false, has_driven_particles_ = false;
   Real outside_work_ = 0;
 };
@@ -204,19 +220,24 @@ Real constant_force_work(Island& island) {
   return work;
 }
 
+bool may_touch(const Island& island, const SurfaceContacts& surfaces, std::size_t body) {
+  return is_in_contact(island, body) || surfaces.may_touch(body);
+}
+
 // What holds a body up against a constant acceleration a takes a h from it after each kick of a substep h: energy is
 // then defined no better than the work over that speed, whatever the state. [J s], to be multiplied with h.
-Real contact_noise_rate(const Island& island, Real duration) {
+Real contact_noise_rate(const Island& island, const SurfaceContacts& surfaces, Real duration) {
   Real rate = 0;
   for (std::size_t k = 0; k < island.bodies.size(); ++k)
-    if (is_in_contact(island, k)) rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
+    if (may_touch(island, surfaces, k))
+      rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
   for (const RigidBody& body : island.rigid_bodies)
     for (int axis = 0; axis < 3; ++axis)
       rate += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] * body.acceleration[axis] * duration;
   return rate;
 }
 
-void undo(Island& island) {
+void undo(Island& island, SurfaceContacts& surfaces) {
   island.rigid_bodies = island.rigid_start;
   for (Contact& contact : island.contacts) contact.depth = 0;
   for (SteppedBody* body : island.bodies) undo_step(*body);
@@ -224,6 +245,7 @@ void undo(Island& island) {
     coupling->field->set_state(coupling->start_state);
     evaluate_forces(*coupling, island);
   }
+  if (!surfaces.is_empty()) surfaces.undo();
 }
 
 void report_contacts(const Island& island) {
@@ -239,17 +261,15 @@ void report_contacts(const Island& island) {
   }
 }
 
-}  // namespace
-
-int wanted_substeps(const Island& island, Real duration) {
-  int substeps = 1;
+int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
+  int substeps = surfaces.least_substeps();
   Real coupling_eigenvalue = 0;  // eigenvalues of a sum are no larger than the sum of the largest
   for (const Coupling* coupling : island.couplings) coupling_eigenvalue += coupling->largest_eigenvalue;
   for (std::size_t k = 0; k < island.bodies.size(); ++k) {
     const SteppedBody& body = *island.bodies[k];
     int wanted = body.options.substeps;
     if (wanted == 0) {
-      const Real safety = is_in_contact(island, k) ? body.options.contact_safety : body.options.safety;
+      const Real safety = may_touch(island, surfaces, k) ? body.options.contact_safety : body.options.safety;
       const Real limit = duration * std::sqrt(body.largest_eigenvalue + coupling_eigenvalue) / 2 / safety;
       wanted = limit < body.options.max_substeps ? static_cast<int>(std::ceil(limit)) : body.options.max_substeps;
     }
@@ -257,6 +277,8 @@ int wanted_substeps(const Island& island, Real duration) {
   }
   return substeps;
 }
+
+}  // namespace
 
 void advance_explicitly(Island& island, Real duration) {
   island.rigid_start = island.rigid_bodies;
@@ -273,21 +295,24 @@ void advance_explicitly(Island& island, Real duration) {
     evaluate_forces(*coupling, island);
   }
   const Real start_energy = energy(island);
-  const Real contact_noise = contact_noise_rate(island, duration) * duration;
+  SurfaceContacts surfaces(island);
+  surfaces.begin_step(duration);
+  const Real contact_noise = contact_noise_rate(island, surfaces, duration) * duration;
 
-  SubCycle cycle(island, duration);
+  SubCycle cycle(island, surfaces, duration);
   const auto attempt = [&](int substeps) {
     const int taken = cycle.run(substeps);
     const Real end_energy = energy(island);
-    return Attempt{.substeps = taken,
-                   .energy = end_energy,
-                   .allowed = start_energy + cycle.outside_work() + constant_force_work(island),
-                   .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / taken};
+    return Attempt{
+        .substeps = taken,
+        .energy = end_energy,
+        .allowed = start_energy + cycle.outside_work() + surfaces.outside_work() + constant_force_work(island),
+        .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / taken};
   };
   const GuardedStep step =
-      guard_energy(wanted_substeps(island, duration), start_energy,
+      guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
                    {.most_substeps = most_substeps, .factor = retry_growth, .increment = 1, .forgives_outside = true},
-                   attempt, [&] { undo(island); });
+                   attempt, [&] { undo(island, surfaces); });
 
   for (SteppedBody* body : island.bodies) {
     body->report.substeps = step.attempt.substeps;
@@ -297,9 +322,10 @@ void advance_explicitly(Island& island, Real duration) {
     body->implicit.has_acceleration = false;
   }
   report_contacts(island);
+  surfaces.report();
   if (!step.finite) {
     name_bad_particles(island.bodies);
-    undo(island);
+    undo(island, surfaces);
     for (SteppedBody* body : island.bodies) body->step_flows = {};
   }
   for (SteppedBody* body : island.bodies) end_step(*body, step.finite ? duration : 0);

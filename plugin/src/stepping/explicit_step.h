@@ -6,7 +6,4 @@ namespace penalty {
 
 void advance_explicitly(Island& island, Real duration);
 
-/// Substeps that the stability limit asks for, at least 1.
-int wanted_substeps(const Island& island, Real duration);
-
 }  // namespace penalty

@@ -6,12 +6,14 @@
 #include "contact_sweep.h"
 #include "explicit_step.h"
 #include "implicit_step.h"
+#include "surface_contacts.h"
 
 namespace penalty {
 namespace {
 
 bool steps_implicitly(const Island& island, Real duration) {
-  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty()) return false;
+  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty() || !island.surfaces.empty())
+    return false;
   const SteppedBody& body = *island.bodies.front();
   if (body.particles.size() == 0) return false;
   if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
@@ -38,6 +40,8 @@ StepReport report_of(const Island& island) {
     sum.capped_energy += report.capped_energy;
   }
   sum.num_contacts = static_cast<int>(island.contacts.size());
+  if (!island.surfaces.empty() && island.surface_scratch)
+    sum.num_contacts += static_cast<int>(island.surface_scratch->pairs.size());
   return sum;
 }
 

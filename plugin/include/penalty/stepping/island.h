@@ -1,5 +1,6 @@
 // One world step of all that touches or holds one another: many explicit substeps, or one implicit one.
 #pragma once
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -12,6 +13,9 @@
 #include "penalty/stepping/step_report.h"
 
 namespace penalty {
+
+class SurfacePair;
+struct SurfaceScratch;
 
 /// What implicit steps keep between steps.
 struct ImplicitState {
@@ -45,6 +49,7 @@ struct SteppedBody {
   int last_substeps = 0;            // what the energy guard settled on
   Real mass = 0;                    // of the particles that are not pinned [kg]
   Real energy_noise = 0;            // growth of energy that means nothing [J]
+  PackedVectors before_contacts;    // velocities [m/s]
   Particles start;                  // positions and velocities to go back to,
   FieldState start_state;           // and what flowed, broke and changed phase
   AffineSpan rest_span;
@@ -67,6 +72,12 @@ struct Coupling {
   FieldState start_state;
 };
 
+/// Where the surfaces of two bodies of an island, or of one, may touch.
+struct SurfaceContact {
+  SurfacePair* pair = nullptr;
+  int body_a = -1, body_b = -1;  // whose surfaces these are; the same: one body with itself
+};
+
 /// Bodies that touch the same rigid bodies, touch each other or are coupled, and all that is between them: what has to
 /// be stepped together.
 struct Island {
@@ -74,10 +85,12 @@ struct Island {
   std::vector<RigidBody> rigid_bodies = {};
   std::vector<Coupling*> couplings = {};
   std::vector<Contact> contacts = {};  // of this step; `advance` puts them in the order of the bodies of their sides a
+  std::vector<SurfaceContact> surfaces = {};
 
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};
   std::vector<std::size_t> contacts_begin = {};  // of the contacts of each body, and their end
+  std::shared_ptr<SurfaceScratch> surface_scratch = {};
 };
 
 /// Sets `largest_eigenvalue` from the stiffness at the rest positions of the field. Call once, and after a change of

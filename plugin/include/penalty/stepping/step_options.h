@@ -7,7 +7,7 @@ namespace penalty {
 enum class Integrator {
   automatic,      // explicit up to `crossover_substeps`, else implicit
   explicit_step,  // sub-cycled velocity Verlet
-  implicit_step,  // backward Euler; where something touches the body or couples it to others: explicit
+  implicit_step,  // backward Euler; where something touches the body or couples it to others, and for what may touch itself: explicit
 };
 
 /// Substeps up to which sub-cycling costs less than an implicit step with its default options: as many were measured to
@@ -29,7 +29,7 @@ struct StepOptions {
   Integrator integrator = Integrator::automatic;
   Real damping_time = 0;          // ratio of damping to stiffness along the constraint gradients, beta [s]
   Real drag = 0;                  // rate at which all velocities decay [1/s]; does not keep momentum
-  int substeps = 0;               // in a step; 0: from the stability limit
+  int substeps = 0;               // in a step; 0: from the stability limit; surfaces that meet fast take more
   Real safety = 0.99;             // share of the stability limit that a substep may use, in (0, 1]
   Real contact_safety = 0.7;      // the same while the body is in contact: impacts excite the fastest modes
   Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps

@@ -20,7 +20,7 @@ struct StepReport {
   int first_bad_particle = -1;  // when not finite: the first such particle at the start, else the fastest
   Real elastic_energy = 0;      // at the end [J]
   Real kinetic_energy = 0;      // at the end, without rigid bodies [J]
-  Real contact_depth = 0;       // largest depth below a contact plane [m]
+  Real contact_depth = 0;       // largest depth below a contact plane, or of a thickness that was lost [m]
   int num_contacts = 0;         // contacts that were considered
   std::string problem = {};     // what is wrong, on one line; the body then stays where it is until it is mended
 

@@ -1,0 +1,218 @@
+// The part of SurfaceContacts that lets nothing cross.
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "surface_contacts.h"
+
+namespace penalty {
+namespace {
+
+constexpr Real kept_share = 0.1;  // of the distance, or of the thickness, that a drift must leave
+constexpr int extra_sweeps = 8;   // before what fails is frozen
+
+// Least distance along n of points of the first feature from those of the second.
+Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edges) {
+  const Real s[] = {n.dot(x[0]), n.dot(x[1]), n.dot(x[2]), n.dot(x[3])};
+  return are_edges ? std::min(s[0], s[1]) - std::max(s[2], s[3]) : s[0] - std::max({s[1], s[2], s[3]});
+}
+
+}  // namespace
+
+void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
+  zone_.clear();
+  bool collected = true;
+  for (int round = 0;; ++round) {
+    if (refresh(h, remaining)) collected = false;
+    find_failing(h);
+    if (scratch_.failing.empty()) return;
+    if (round < extra_sweeps) {
+      if (!collected) collect();
+      collected = true;
+      rigid_sweep();
+      bool hit = false;
+      sweep_pairs(h, hit);
+    } else {
+      freeze(h);
+    }
+    take_velocities();
+  }
+}
+
+void SurfaceContacts::find_failing(Real h) {
+  scratch_.failing.clear();
+  for (const SurfaceContact& contact : island_.surfaces)
+    contact.pair->visit_near([&](const FeaturePair& q, Real) {
+      const FailingPair pair{&contact, &q};
+      if (!(!zone_.empty() && is_in_one_zone(pair)) && !is_safe(contact, q, h)) scratch_.failing.push_back(pair);
+    });
+}
+
+bool SurfaceContacts::is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const {
+  const ContactSurface &one = contact.pair->first(q), &two = contact.pair->second(q);
+  const int size_of_first = q.are_edges ? 2 : 1;
+  std::array<Vector3, 4> x, v;
+  for (int k = 0; k < 4; ++k) {
+    const ContactSurface& surface = k < size_of_first ? one : two;
+    x[k] = surface.position(q.points[k]);
+    v[k] = surface.velocity(q.points[k]);
+  }
+  const auto closest = [&] {
+    return (q.are_edges ? closest_points_of_edges(x[0], x[1], x[2], x[3])
+                        : closest_points_of_triangle(x[0], x[1], x[2], x[3]))
+        .difference;
+  };
+  const Vector3 before = closest();
+  const Real distance = before.norm();
+  if (contact.pair->has_no_direction(q, distance)) return true;
+  Real relative2 = 0;
+  for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
+  const Real kept =
+      std::min(distance, std::max(kept_share * std::min(distance, q.thickness), 2 * contact.pair->least_distance(q)));
+  if (2 * h * std::sqrt(relative2) < distance - kept) return true;
+  const std::array<Vector3, 4> start = x;
+  for (int k = 0; k < 4; ++k) x[k] += h * v[k];
+  if (separation(before / distance, start, q.are_edges) > 0 && separation(before / distance, x, q.are_edges) >= kept)
+    return true;
+  const Vector3 after = closest();
+  const Real distance_after = after.norm();
+  return distance_after >= kept && distance_after > 0 && separation(after / distance_after, start, q.are_edges) > 0;
+}
+
+template <class Visit>
+void SurfaceContacts::visit_particles(const FailingPair& pair, const Visit& visit) const {
+  const FeaturePair& q = *pair.features;
+  const SurfaceContact& contact = *pair.contact;
+  const int size_of_first = q.are_edges ? 2 : 1;
+  for (int k = 0; k < 4; ++k) {
+    const bool is_of_b = (k < size_of_first) == q.from_b;
+    const WeightedPoint& point = (is_of_b ? contact.pair->b() : contact.pair->a()).points()[q.points[k]];
+    for (int i = 0; i < point.size; ++i)
+      visit(first_particle_[is_of_b ? contact.body_b : contact.body_a] + point.particles[i]);
+  }
+}
+
+int SurfaceContacts::zone_of(int particle) {
+  while (zone_[particle] != particle) particle = zone_[particle] = zone_[zone_[particle]];
+  return particle;
+}
+
+bool SurfaceContacts::is_in_one_zone(const FailingPair& pair) {
+  int zone = -1;
+  bool is_one = true;
+  visit_particles(pair, [&](int particle) {
+    const int own = zone_of(particle);
+    is_one = is_one && (zone < 0 || zone == own);
+    zone = own;
+  });
+  return is_one;
+}
+
+std::pair<SteppedBody*, int> SurfaceContacts::particle(int number) const {
+  const auto next = std::upper_bound(first_particle_.begin(), first_particle_.end(), number);
+  const auto body = next - first_particle_.begin() - 1;
+  return {island_.bodies[body], number - first_particle_[body]};
+}
+
+// Joins the particles of failing pairs into zones and makes these rigid, until no pair at their particles fails. The map
+// of a rigid zone, x + h (V + w x (x - c)), lets nothing inside it collapse: its singular values are at least one.
+void SurfaceContacts::freeze(Real h) {
+  const int num_particles = first_particle_.back();
+  if (zone_.empty()) {
+    zone_.resize(num_particles);
+    std::iota(zone_.begin(), zone_.end(), 0);
+  }
+  std::vector<std::vector<FailingPair>> pairs_of(num_particles);
+  for (const SurfaceContact& contact : island_.surfaces)
+    contact.pair->visit_near([&](const FeaturePair& q, Real) {
+      const FailingPair pair{&contact, &q};
+      visit_particles(pair, [&](int particle) { pairs_of[particle].push_back(pair); });
+    });
+  std::vector<std::vector<int>> members(num_particles);
+  for (int i = 0; i < num_particles; ++i) members[zone_of(i)].push_back(i);
+
+  std::vector<FailingPair>& failing = scratch_.failing;
+  while (!failing.empty()) {
+    std::vector<int> touched;
+    for (const FailingPair& pair : failing) {
+      int into = -1;
+      visit_particles(pair, [&](int particle) {
+        const int zone = zone_of(particle);
+        if (into < 0) into = zone;
+        if (zone == into) return;
+        const auto [low, high] = std::minmax(zone, into);
+        zone_[high] = low;
+        members[low].insert(members[low].end(), members[high].begin(), members[high].end());
+        members[high].clear();
+        into = low;
+      });
+      touched.push_back(into);
+    }
+    for (int& zone : touched) zone = zone_of(zone);
+    std::sort(touched.begin(), touched.end());
+    touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+    failing.clear();
+    std::vector<FailingPair> again;
+    for (const int zone : touched) {
+      std::sort(members[zone].begin(), members[zone].end());
+      make_rigid(members[zone]);
+      for (const int particle : members[zone])
+        again.insert(again.end(), pairs_of[particle].begin(), pairs_of[particle].end());
+    }
+    take_velocities();
+    for (const FailingPair& pair : again)
+      if (!is_in_one_zone(pair) && !is_safe(*pair.contact, *pair.features, h)) failing.push_back(pair);
+  }
+}
+
+// What is held holds the rest.
+void SurfaceContacts::make_rigid(std::span<const int> particles) {
+  const auto position = [this](int number) {
+    const auto [body, i] = particle(number);
+    return Vector3(body->particles.positions.col(i).head<3>());
+  };
+  const auto velocity = [this](int number) {
+    const auto [body, i] = particle(number);
+    return Eigen::Map<Vector3>(body->particles.velocities.data() + 4 * i);
+  };
+  const auto inverse_mass = [this](int number) {
+    const auto [body, i] = particle(number);
+    return body->particles.inverse_masses[i];
+  };
+  for (const int held : particles)
+    if (!(inverse_mass(held) > 0)) {
+      const Vector3 v = velocity(held);
+      Real gain = 0;
+      for (const int i : particles) {
+        if (!(inverse_mass(i) > 0)) continue;
+        gain += (v.squaredNorm() - velocity(i).squaredNorm()) / 2 / inverse_mass(i);
+        velocity(i) = v;
+      }
+      outside_work_ += std::max<Real>(gain, 0);
+      return;
+    }
+  const Vector3 origin = position(particles.front());
+  Real mass = 0;
+  Vector3 center = Vector3::Zero(), mean = Vector3::Zero();
+  for (const int i : particles) {
+    const Real m = 1 / inverse_mass(i);
+    mass += m;
+    center += m * (position(i) - origin);
+    mean += m * velocity(i);
+  }
+  center = origin + center / mass;
+  mean /= mass;
+  Vector3 spin = Vector3::Zero();
+  Matrix3 inertia = Matrix3::Zero();
+  for (const int i : particles) {
+    const Real m = 1 / inverse_mass(i);
+    const Vector3 arm = position(i) - center;
+    spin += m * arm.cross(velocity(i) - mean);
+    inertia += m * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+  }
+  const Vector3 turn = inertia.fullPivLu().solve(spin);
+  for (const int i : particles) velocity(i) = mean + turn.cross(position(i) - center);
+}
+
+}  // namespace penalty

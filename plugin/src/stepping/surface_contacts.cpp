@@ -1,0 +1,329 @@
+#include "surface_contacts.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace penalty {
+namespace {
+
+constexpr Real recovery_time = 0.05;   // in which lost thickness comes back [s],
+constexpr Real recovery_speed = 0.02;  // no faster than this [m/s]
+constexpr Real exit_speed = 0.2;       // of what is led out of a closed surface, at most [m/s]
+constexpr Real slop = 0.02;            // share of the thickness that may be lost
+constexpr Real step_share = 0.5;       // of the thickness that a substep may bring surfaces closer
+constexpr int most_substeps = 400;     // to that end; beyond it the guard has more to do
+constexpr int fewest_substeps = 16;    // of a step in which surfaces are near
+constexpr int most_sweeps = 50;
+constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
+constexpr Real relative_tolerance = 0.1;  // and by no more than that of the first,
+constexpr Real negligible = 1e-5;         // unless it is this small
+
+Eigen::Map<Vector3> vector(Real* p) { return Eigen::Map<Vector3>(p); }
+Eigen::Map<const Vector3> vector(const Real* p) { return Eigen::Map<const Vector3>(p); }
+
+}  // namespace
+
+SurfaceContacts::SurfaceContacts(Island& island)
+    : island_(island),
+      scratch_(*(island.surface_scratch ? island.surface_scratch
+                                        : island.surface_scratch = std::make_shared<SurfaceScratch>())) {
+  if (is_empty()) return;
+  surfaces_.assign(island.bodies.size(), nullptr);
+  may_touch_.assign(island.bodies.size(), false);
+  lost_thickness_.assign(island.bodies.size(), 0);
+  for (const SurfaceContact& contact : island.surfaces) {
+    surfaces_[contact.body_a] = &contact.pair->a();
+    surfaces_[contact.body_b] = &contact.pair->b();
+  }
+  first_particle_.push_back(0);
+  for (const SteppedBody* body : island.bodies)
+    first_particle_.push_back(first_particle_.back() + body->particles.size());
+}
+
+void SurfaceContacts::take_positions() {
+  for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    if (surfaces_[k]) surfaces_[k]->take_positions(island_.bodies[k]->particles.positions);
+}
+
+void SurfaceContacts::take_velocities() {
+  for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    if (surfaces_[k]) surfaces_[k]->take_velocities(island_.bodies[k]->particles.velocities);
+}
+
+void SurfaceContacts::begin_step(Real duration) {
+  if (is_empty()) return;
+  for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    if (surfaces_[k]) surfaces_[k]->begin_step(island_.bodies[k]->particles.positions);
+  take_velocities();
+  Real needed = 1;
+  for (const SurfaceContact& contact : island_.surfaces) {
+    SurfacePair& pair = *contact.pair;
+    pair.begin_step();
+    pair.refresh(duration / fewest_substeps, duration);
+    if (pair.has_near()) needed = std::max<Real>(needed, fewest_substeps);
+    const Real closing = duration * pair.closing_speed(duration);
+    // Patches of one body lie side by side, and always move a little.
+    if (pair.has_near() || (!pair.is_self() && closing > 0))
+      for (const int body : {contact.body_a, contact.body_b}) may_touch_[body] = true;
+    if (closing > 0 && pair.thickness() > 0)
+      needed = std::max(needed, std::min<Real>(std::ceil(closing / (step_share * pair.thickness())), most_substeps));
+  }
+  least_substeps_ = static_cast<int>(needed);
+}
+
+bool SurfaceContacts::refresh(Real h, Real remaining) {
+  bool changed = false;
+  for (const SurfaceContact& contact : island_.surfaces) changed = contact.pair->refresh(h, remaining) || changed;
+  return changed;
+}
+
+void SurfaceContacts::sweep(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
+  take_velocities();
+  refresh(h, remaining);
+  collect();
+  if (converge(h, rigid_sweep)) take_velocities();
+  guard(h, remaining, rigid_sweep);
+}
+
+void SurfaceContacts::close(Real h, const std::function<void()>& rigid_sweep) {
+  take_velocities();
+  refresh(h, h);
+  collect();
+  converge(h, rigid_sweep);
+}
+
+void SurfaceContacts::drifted(Real h) {
+  for (ContactSurface* surface : surfaces_)
+    if (surface) surface->drift(h);
+  take_positions();
+}
+
+void SurfaceContacts::undo() {
+  outside_work_ = 0;
+  std::fill(lost_thickness_.begin(), lost_thickness_.end(), 0);
+  for (ContactSurface* surface : surfaces_)
+    if (surface) surface->forget();
+  take_positions();
+  for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
+}
+
+void SurfaceContacts::collect() {
+  scratch_.pairs.clear();
+  scratch_.particles.clear();
+  for (const SurfaceContact& contact : island_.surfaces) {
+    contact.pair->visit_near([&](const FeaturePair& q, Real reach) {
+      const ClosestPoints closest = contact.pair->closest(q);
+      if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
+      const Real limit = q.thickness + reach;
+      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, false);
+    });
+    for (const EnclosedPoint& enclosed : contact.pair->enclosed()) lead_out(contact, enclosed);
+  }
+}
+
+void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest,
+                          bool leads_out) {
+  const SurfacePair& surfaces = *contact.pair;
+  const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
+  TouchingPair pair{.begin = scratch_.particles.size(),
+                    .difference = closest.difference,
+                    .thickness = q.thickness,
+                    .friction = surfaces.friction(),
+                    .leads_out = leads_out,
+                    .body_a = contact.body_a,
+                    .body_b = contact.body_b};
+  const Real distance = closest.difference.norm();
+  pair.gap = (leads_out ? -distance : distance) - q.thickness;
+  if (!surfaces.has_no_direction(q, distance)) {
+    pair.normal = closest.difference / (leads_out ? -distance : distance);  // the difference points inwards
+  } else {                                                                  // a closed surface knows its outside
+    if (q.are_edges || !two.is_closed()) return;
+    const Vector3 a = two.position(q.points[1]);
+    pair.normal = (two.position(q.points[2]) - a).cross(two.position(q.points[3]) - a).normalized();
+    if (pair.normal.isZero(0)) return;
+  }
+  const int of_first = q.from_b ? contact.body_b : contact.body_a,
+            of_second = q.from_b ? contact.body_a : contact.body_b;
+  const int size_of_first = q.are_edges ? 2 : 1;
+  for (int k = 0; k < 4; ++k)
+    add_particles((k < size_of_first ? one : two).points()[q.points[k]], closest.weights[k],
+                  k < size_of_first ? of_first : of_second, pair.begin);
+  pair.end = scratch_.particles.size();
+  pair.mobility = 0;
+  for (std::size_t k = pair.begin; k < pair.end; ++k) {
+    const TouchingParticle& p = scratch_.particles[k];
+    pair.mobility += p.weight * p.weight * p.inverse_mass;
+  }
+  if (!(pair.mobility > 0)) {
+    scratch_.particles.resize(pair.begin);
+    return;
+  }
+  scratch_.pairs.push_back(pair);
+  for (const int body : {pair.body_a, pair.body_b}) lost_thickness_[body] = std::max(lost_thickness_[body], -pair.gap);
+}
+
+void SurfaceContacts::report() const {
+  for (std::size_t k = 0; k < lost_thickness_.size(); ++k) {
+    StepReport& report = island_.bodies[k]->report;
+    report.contact_depth = std::max(report.contact_depth, lost_thickness_[k]);
+  }
+  if (is_empty()) return;
+  for (const TouchingPair& pair : scratch_.pairs) {
+    ++island_.bodies[pair.body_a]->report.num_contacts;
+    if (pair.body_b != pair.body_a) ++island_.bodies[pair.body_b]->report.num_contacts;
+  }
+}
+
+// Points of an embedded surface may share particles.
+void SurfaceContacts::add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin) {
+  Particles& particles = island_.bodies[body]->particles;
+  for (int k = 0; k < point.size; ++k) {
+    const int i = point.particles[k];
+    Real* velocity = particles.velocities.data() + 4 * i;
+    const Real share = weight * point.weights[k];
+    const auto known =
+        std::find_if(scratch_.particles.begin() + static_cast<std::ptrdiff_t>(begin), scratch_.particles.end(),
+                     [&](const TouchingParticle& p) { return p.velocity == velocity; });
+    if (known != scratch_.particles.end())
+      known->weight += share;
+    else
+      scratch_.particles.push_back({velocity, particles.positions.data() + 4 * i, share, particles.inverse_masses[i]});
+  }
+}
+
+void SurfaceContacts::lead_out(const SurfaceContact& contact, const EnclosedPoint& enclosed) {
+  const SurfacePair& pair = *contact.pair;
+  ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
+  const ContactSurface::Nearest nearest =
+      around.nearest((enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point));
+  if (nearest.triangle < 0) return;
+  const auto& [t0, t1, t2] = around.triangles()[nearest.triangle];
+  const Vector3 outwards = (around.position(t1) - around.position(t0)).cross(around.position(t2) - around.position(t0));
+  add(contact,
+      {.points = {enclosed.point, t0, t1, t2},
+       .are_edges = false,
+       .from_b = enclosed.of_b,
+       .thickness = pair.thickness()},
+      nearest.closest, nearest.closest.difference.dot(outwards) < 0);
+}
+
+Vector3 SurfaceContacts::relative_velocity(const TouchingPair& pair) const {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t k = pair.begin; k < pair.end; ++k)
+    sum += scratch_.particles[k].weight * vector(scratch_.particles[k].velocity);
+  return sum;
+}
+
+bool SurfaceContacts::converge(Real h, const std::function<void()>& rigid_sweep) {
+  bool changed = false;
+  Real first = 0;
+  for (int sweep = 0; sweep < most_sweeps && !scratch_.pairs.empty(); ++sweep) {
+    rigid_sweep();
+    bool hit = false;
+    const Real worst = sweep_pairs(h, hit);
+    if (!hit) break;
+    changed = true;
+    if (sweep == 0) first = worst;
+    if (worst < tolerance && (worst < relative_tolerance * first || worst < negligible)) break;
+  }
+  rigid_sweep();
+  return changed || !island_.contacts.empty();
+}
+
+// Whoever drives particles that are held does the work of what they give.
+void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3& direction) {
+  for (std::size_t k = pair.begin; k < pair.end; ++k) {
+    const TouchingParticle& p = scratch_.particles[k];
+    if (p.inverse_mass > 0)
+      vector(p.velocity) += p.weight * p.inverse_mass * impulse * direction;
+    else
+      outside_work_ -= p.weight * impulse * direction.dot(vector(p.velocity));
+  }
+}
+
+// Returns the largest change of a distance in the drift, relative to its thickness.
+Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
+  Real worst = 0;
+  for (TouchingPair& pair : scratch_.pairs) {
+    const Vector3 velocity = relative_velocity(pair);
+    const Real speed = pair.normal.dot(velocity);
+    Real wanted = -pair.gap / h;
+    if (wanted > 0)
+      wanted = std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
+                                pair.leads_out ? exit_speed : recovery_speed);
+    if (speed >= wanted) continue;
+    hit = true;
+    worst = std::max(worst, (wanted - speed) * h / pair.thickness);
+    const Real impulse = (wanted - speed) / pair.mobility;
+    push(pair, impulse, pair.normal);
+    const Real recovery = std::max<Real>(impulse * wanted, 0);  // as of a surface that moves so fast
+    outside_work_ += recovery;
+    const Real loss = recovery - impulse * (speed + wanted) / 2;
+    island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
+    island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
+    if (pair.friction > 0) rub(pair, impulse, velocity - speed * pair.normal);
+  }
+  return worst;
+}
+
+void SurfaceContacts::find_inertia(TouchingPair& pair) const {
+  pair.has_inertia = true;
+  const std::span<const TouchingParticle> particles(&scratch_.particles[pair.begin], pair.end - pair.begin);
+  Real mass = 0;
+  for (const TouchingParticle& p : particles) {
+    if (!(p.inverse_mass > 0)) return;
+    mass += 1 / p.inverse_mass;
+    pair.center += vector(p.position) / p.inverse_mass;
+  }
+  pair.center /= mass;
+  Matrix3 inertia = Matrix3::Zero();
+  for (const TouchingParticle& p : particles) {
+    const Vector3 arm = vector(p.position) - pair.center;
+    inertia += (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose()) / p.inverse_mass;
+  }
+  constexpr Real singular = 1e-9;
+  const Real trace = inertia.trace();
+  pair.can_turn = inertia.determinant() > singular * trace * trace * trace;
+  if (pair.can_turn) pair.inverse_inertia = inertia.inverse();
+}
+
+// A pinned particle takes up any moment; particles in one line have none about it to speak of, and no friction.
+void SurfaceContacts::rub(TouchingPair& pair, Real normal_impulse, Vector3 slip) {
+  if (!pair.has_inertia) find_inertia(pair);
+  const std::span<const TouchingParticle> particles(&scratch_.particles[pair.begin], pair.end - pair.begin);
+  Vector3 turn = Vector3::Zero();  // of the particles, that a unit impulse along the slip gives [rad/s / (N s)]
+  Vector3 direction = Vector3::Zero();
+  Real mobility = pair.mobility, slip_speed = 0;
+  constexpr Real no_slip = 1e-12;
+  if (pair.can_turn) {
+    Vector3 spin = Vector3::Zero();
+    for (const TouchingParticle& p : particles)
+      spin += (vector(p.position) - pair.center).cross(Vector3(vector(p.velocity))) / p.inverse_mass;
+    slip -= (pair.inverse_inertia * spin).cross(pair.difference);
+    slip -= pair.normal.dot(slip) * pair.normal;
+    slip_speed = slip.norm();
+    if (!(slip_speed > no_slip)) return;
+    direction = slip / slip_speed;
+    const Vector3 moment = pair.difference.cross(direction);
+    turn = pair.inverse_inertia * moment;
+    mobility -= moment.dot(turn);
+    if (!(mobility > 1e-6 * pair.mobility)) return;
+  } else {
+    const bool is_held = std::any_of(particles.begin(), particles.end(),
+                                     [](const TouchingParticle& p) { return !(p.inverse_mass > 0); });
+    slip_speed = slip.norm();
+    if (!is_held || !(slip_speed > no_slip)) return;
+    direction = slip / slip_speed;
+  }
+  const Real impulse = std::min(pair.friction * normal_impulse, slip_speed / mobility);
+  push(pair, -impulse, direction);
+  if (pair.can_turn)
+    for (const TouchingParticle& p : particles)
+      vector(p.velocity) += impulse * turn.cross(Vector3(vector(p.position)) - pair.center);
+  const Real loss = impulse * (slip_speed - impulse * mobility / 2);
+  island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
+  island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
+}
+
+}  // namespace penalty

@@ -1,0 +1,137 @@
+// Contacts between surfaces of soft bodies, through the substeps of one step.
+#pragma once
+#include <functional>
+
+#include "penalty/contact/surface_pair.h"
+#include "penalty/stepping/island.h"
+
+namespace penalty {
+
+/// Where two features touch, or may in the coming drift.
+struct TouchingPair {
+  std::size_t begin = 0, end = 0;        // of its particles
+  Vector3 normal = Vector3::Zero();      // from the point of the second feature to that of the first
+  Vector3 difference = Vector3::Zero();  // the way between these points [m]
+  Real gap = 0, thickness = 0;           // distance beyond the thickness; negative where some of that is lost [m]
+  Real mobility = 0;                     // of an impulse along the normal [1/kg]
+  Real friction = 0;
+  bool leads_out = false;      // out of a closed surface that the first feature, a point, is inside of
+  int body_a = 0, body_b = 0;  // half of what is lost is booked to each
+
+  // What friction needs, found when it is needed first: see SurfaceContacts::rub.
+  bool has_inertia = false, can_turn = false;
+  Vector3 center = Vector3::Zero();
+  Matrix3 inverse_inertia = Matrix3::Zero();
+};
+
+/// A particle of a touching pair: an impulse J on the pair gives it weight * J.
+struct TouchingParticle {
+  Real* velocity;
+  const Real* position;
+  Real weight, inverse_mass;
+};
+
+/// What fails the guard: a pair of features, and where it comes from.
+struct FailingPair {
+  const SurfaceContact* contact;
+  const FeaturePair* features;
+};
+
+/// Memory that is kept between steps.
+struct SurfaceScratch {
+  std::vector<TouchingPair> pairs;
+  std::vector<TouchingParticle> particles;
+  std::vector<FailingPair> failing;
+};
+
+/// Each pair of features that may touch in a drift of h is a one-sided constraint on velocities along the direction n
+/// between its closest points as they are at this instant: of the distance D and the thickness d that is kept, the
+/// relative normal speed u is asked to be u >= -(D - d)/h while there is a gap, and u >= 0 when there is none; thickness
+/// that was lost comes back at (d - D) / 0.05 s, at 2 cm/s at most. The impulse goes to both features by weight and inverse
+/// mass. There is no stiffness, no sign and no memory of sides: the two sides of a cloth are the same.
+///
+/// Friction acts at two points that are a thickness apart, so it would turn the particles of the pair: the part of
+/// the slip that is a rotation of these is left out, and so is the rotation that the impulse would give. Both momenta are
+/// kept to round-off, but where features lie on each other, see SurfacePair::has_no_direction.
+///
+/// Sweeps go on until they change nothing that matters, contacts with rigid bodies in each of them and once more at
+/// the end. Then the guard lets no pair drift unless a plane separates it before and after: linear motions separated at
+/// both ends are separated throughout. What fails is swept again; what fails still moves on as one rigid body, which
+/// keeps both momenta where nothing is held.
+///
+/// What starts out pierced is left to pass; points inside a closed surface are led to the nearest place of it, at
+/// 0.2 m/s at most.
+class SurfaceContacts {
+ public:
+  explicit SurfaceContacts(Island& island);
+
+  bool is_empty() const { return island_.surfaces.empty(); }
+
+  /// Begins a step from where the particles are.
+  void begin_step(Real duration);
+
+  /// Whether the surfaces of this body may touch in the step.
+  bool may_touch(std::size_t body) const { return !is_empty() && may_touch_[body]; }
+
+  /// Substeps that the step needs so that none brings surfaces closer by more than half the thickness; 1 if none may
+  /// touch.
+  int least_substeps() const { return least_substeps_; }
+
+  /// Before a drift of `h` [s] in which the particles move by their velocities. `rigid_sweep` is one sweep over the
+  /// contacts with rigid bodies. `remaining`: of the step, the drift included [s].
+  void sweep(Real h, Real remaining, const std::function<void()>& rigid_sweep);
+
+  /// The same where nothing drifts: takes the approach that the last half kick left.
+  void close(Real h, const std::function<void()>& rigid_sweep);
+
+  /// After the drift.
+  void drifted(Real h);
+
+  /// The particles were put back to where the step began; the work is forgotten.
+  void undo();
+
+  /// Adds to the reports of the bodies: what touched at the end, and the most of a thickness that was lost.
+  void report() const;
+
+  /// Of giving thickness back, leading out, and of whoever drives what is held [J].
+  Real outside_work() const { return outside_work_; }
+
+ private:
+  void take_positions();
+  void take_velocities();
+  bool refresh(Real h, Real remaining);
+  bool converge(Real h, const std::function<void()>& rigid_sweep);
+  void collect();
+  void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, bool leads_out);
+  void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
+  void lead_out(const SurfaceContact& contact, const EnclosedPoint& enclosed);
+  Real sweep_pairs(Real h, bool& hit);
+  void push(const TouchingPair& pair, Real impulse, const Vector3& direction);
+  void rub(TouchingPair& pair, Real normal_impulse, Vector3 slip);
+  void find_inertia(TouchingPair& pair) const;
+  Vector3 relative_velocity(const TouchingPair& pair) const;
+
+  // The guard.
+  void guard(Real h, Real remaining, const std::function<void()>& rigid_sweep);
+  void find_failing(Real h);
+  bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;
+  void freeze(Real h);
+  void make_rigid(std::span<const int> particles);
+  template <class Visit>
+  void visit_particles(const FailingPair& pair, const Visit& visit) const;
+  bool is_in_one_zone(const FailingPair& pair);
+  int zone_of(int particle);
+  std::pair<SteppedBody*, int> particle(int number) const;
+
+  Island& island_;
+  SurfaceScratch& scratch_;
+  std::vector<ContactSurface*> surfaces_;  // of the island's bodies, null: none
+  std::vector<int> first_particle_;        // of each body, and their number: particles numbered through
+  std::vector<int> zone_;                  // of particles that move as one: another of these; empty: none do
+  std::vector<char> may_touch_;            // each body
+  std::vector<Real> lost_thickness_;       // of each body, the most in this step [m]
+  int least_substeps_ = 1;
+  Real outside_work_ = 0;
+};
+
+}  // namespace penalty
