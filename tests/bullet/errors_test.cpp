@@ -146,7 +146,7 @@ class Refused : public WorldTest {
     sim.step(frame);
     return what;
   }
-  std::string stepping_with(const StepOptions& step) { return attaching_with({step, {}}); }
+  std::string stepping_with(const StepOptions& step) { return attaching_with({.step = step}); }
   std::string touching_with(const WeightedPoint& point) {
     AttachOptions options;
     options.contact_points = {WeightedPoint::at_particle(0), point};
@@ -158,6 +158,15 @@ class Refused : public WorldTest {
 
   const TetMesh ball = make_ball(0.25, 1);  // 13 vertices
 };
+
+TEST_P(Refused, ASurfaceThatIsNotOfTheBody) {
+  AttachOptions options;
+  options.surface.points = {WeightedPoint::at_particle(0), WeightedPoint::at_particle(13)};
+  EXPECT_EQ(attaching_with(options), "attach: surface point 1: index 13 is outside the 13 nodes");
+  options.surface.points[1] = WeightedPoint::at_particle(1);
+  options.surface.triangles = {{0, 1, 2}};
+  EXPECT_EQ(attaching_with(options), "attach: surface triangle 0: index 2 is outside the 2 surface points");
+}
 
 TEST_P(Refused, AFieldForAnotherNumberOfParticles) {
   btSoftBody& body = add_ball();

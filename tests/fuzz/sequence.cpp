@@ -166,6 +166,13 @@ AttachOptions Sequence::random_options(Body& body) {
     if (!legal() && chance_.one_in(3)) point.weights[0] = chance_.anything();
     options.contact_points = {point};
   }
+  if (chance_.one_in(4)) options.self_contact = chance_.one_in(2);
+  if (chance_.one_in(8)) {
+    for (int k = 0; k < 4; ++k)
+      options.surface.points.push_back(
+          WeightedPoint::at_particle(chance_.index(static_cast<int>(body.mesh.vertices.cols()))));
+    options.surface.triangles = {{0, 1, 2}, {0, 3, legal() ? 1 : chance_.index(6) - 1}};
+  }
   if (step.drag != 0) body.conserves = false;
   if (!legal()) body.ordinary = false;
   return options;

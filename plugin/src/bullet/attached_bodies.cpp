@@ -10,9 +10,20 @@
 namespace penalty {
 namespace {
 
-void check_contact_points(const std::vector<WeightedPoint>& points, int num_particles) {
+void check_points(const std::vector<WeightedPoint>& points, int num_particles, const char* which) {
   for (std::size_t k = 0; k < points.size(); ++k)
-    points[k].check(num_particles, "attach: contact point " + std::to_string(k));
+    points[k].check(num_particles, std::string("attach: ") + which + " point " + std::to_string(k));
+}
+
+void check_surface(const BodySurface& surface, int num_particles) {
+  check_points(surface.points, num_particles, "surface");
+  const std::size_t num_points = surface.points.size();
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    for (const int point : surface.triangles[t])
+      if (point < 0 || static_cast<std::size_t>(point) >= num_points)
+        throw std::invalid_argument("attach: surface triangle " + std::to_string(t) + ": index " +
+                                    std::to_string(point) + " is outside the " + std::to_string(num_points) +
+                                    " surface points");
 }
 
 }  // namespace
@@ -32,12 +43,14 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
   if (!body.getWorldInfo() || !body.getWorldInfo()->m_broadphase)
     throw std::invalid_argument("attach: the soft body's world info has no broadphase: use that of the world");
   options.step.check();
-  check_contact_points(options.contact_points, field.num_particles());
+  check_points(options.contact_points, field.num_particles(), "contact");
+  check_surface(options.surface, field.num_particles());
   HeldBodies& bodies = *attached_->bodies;
   HeldBody* held = bodies.find(body);
   if (held) {
     held->field.add(std::move(field));
     held->options = options;
+    held->surface.reset();
     held->stepped.options = options.step;
     held->stale = true;
     held->stepped.positions_changed();

@@ -63,6 +63,7 @@ HeldBody* HeldBodies::find(const Identity& name) const {
 
 HeldBody& HeldBodies::add(btSoftBody& body, PotentialField field, const AttachOptions& options) {
   auto held = std::make_unique<HeldBody>(body, std::move(field), options);
+  held->order = ++attached_;
   return *(bodies_[&body] = std::move(held));  // in the place of one that is gone
 }
 

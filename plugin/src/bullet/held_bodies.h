@@ -8,6 +8,7 @@
 #include "identity.h"
 #include "nodes.h"
 #include "penalty/bullet/attached_bodies.h"
+#include "penalty/contact/contact_surface.h"
 #include "penalty/stepping/island.h"
 
 namespace penalty {
@@ -24,18 +25,22 @@ struct HeldBody {
 
   btSoftBody* body;  // to be followed only where it is known to be alive: given by the caller, or listed by the world
   SerialNumber serial;
+  std::uint64_t order = 0;  // in which the bodies of the solver were attached; no two have the same
   PotentialField field;
   AttachOptions options;
   SteppedBody stepped;
   Nodes nodes;
-  bool stale = true;                    // the stability estimate is to be made anew
-  std::uint64_t estimated_version = 0;  // of the field's stiffness
-  int listed = 0;                       // step in which the world last had the body; 0: none so far
+  bool stale = true;                        // the stability estimate is to be made anew
+  std::uint64_t estimated_version = 0;      // of the field's stiffness
+  std::shared_ptr<ContactSurface> surface;  // made when it is needed first,
+  std::array<int, 2> surface_size{};        // of so many faces and links
+  int listed = 0;                           // step in which the world last had the body; 0: none so far
 
   // Of this step.
   StepOutcome outcome = StepOutcome::none;
   int activation_state = 0;        // to be restored
   bool friction_is_finite = true;  // of what it touches
+  int number = 0;                  // of the body in its island
   PackedVectors start;             // positions before the step, to go back to [m]
 
   Identity identity() const { return {body, serial}; }
@@ -73,6 +78,7 @@ class HeldBodies {
  private:
   std::unordered_map<const btCollisionObject*, std::unique_ptr<HeldBody>> bodies_;
   int step_ = 0;
+  std::uint64_t attached_ = 0;
 };
 
 }  // namespace penalty

@@ -95,4 +95,8 @@ void PenaltyDeformableBodySolver::processCollision(btSoftBody* body, const btCol
   if (!is_attached(*body)) btDeformableBodySolver::processCollision(body, object);
 }
 
+void PenaltyDeformableBodySolver::processCollision(btSoftBody* body, btSoftBody* other) {
+  if (!is_attached(*body) || !is_attached(*other)) btDeformableBodySolver::processCollision(body, other);
+}
+
 }  // namespace penalty

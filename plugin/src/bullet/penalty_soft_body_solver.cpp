@@ -1,5 +1,7 @@
 #include "penalty/bullet/penalty_soft_body_solver.h"
 
+#include <algorithm>
+
 #include "convert.h"
 #include "world_step.h"
 
@@ -10,6 +12,15 @@ namespace {
 // links are replaced by the field.
 bool has_position_constraints(const btSoftBody& body) {
   return body.m_anchors.size() > 0 || body.m_scontacts.size() > 0 || body.m_clusters.size() > 0;
+}
+
+// Bullet's tree over the faces serves its own contact with soft bodies that are not attached. Without links its
+// construction never ends.
+void predict(btSoftBody& body, bool meets_others, btScalar time_step) {
+  const int collisions = body.m_cfg.collisions;
+  if (!meets_others || body.m_links.size() == 0) body.m_cfg.collisions &= ~btSoftBody::fCollision::VF_SS;
+  body.predictMotion(time_step);
+  body.m_cfg.collisions = collisions;
 }
 
 void solve_position_constraints(btSoftBody& body) {
@@ -30,6 +41,8 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
   for (btSoftBody* body : bodies)
     if (!is_attached(*body) && body->isActive()) body->predictMotion(time_step);
 
+  const bool meets_others =
+      std::any_of(bodies.begin(), bodies.end(), [this](const btSoftBody* body) { return !is_attached(*body); });
   for (HeldBody* held : attached_->step(bodies, time_step, false)) {
     btSoftBody& body = *held->body;
     Particles& particles = held->stepped.particles;
@@ -38,7 +51,7 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
     // Bullet's prediction keeps its bounds and trees, which are to follow the mean velocity; gravity it adds itself.
     const Vector3 gravity_dv = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_cfg.timescale * time_step);
     held->nodes.write_mean_velocities(particles, held->stepped.start.positions, time_step, gravity_dv);
-    body.predictMotion(time_step);
+    predict(body, meets_others, time_step);
     // A start position from which the end velocity leads to the end position: whatever Bullet's position constraints
     // then do arrives as a change of that velocity.
     held->nodes.write(particles, body.m_sst.sdt);
@@ -68,7 +81,7 @@ void PenaltySoftBodySolver::processCollision(btSoftBody* body, const btCollision
 }
 
 void PenaltySoftBodySolver::processCollision(btSoftBody* body, btSoftBody* other) {
-  btDefaultSoftBodySolver::processCollision(body, other);
+  if (!is_attached(*body) || !is_attached(*other)) btDefaultSoftBodySolver::processCollision(body, other);
 }
 
 }  // namespace penalty

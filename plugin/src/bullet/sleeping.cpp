@@ -3,10 +3,13 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletSoftBody/btSoftBody.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "convert.h"
 #include "couplings.h"
+#include "held_bodies.h"
 #include "obstacles.h"
 #include "world_island.h"
 
@@ -48,24 +51,30 @@ void wait_for_carried(btSoftBody& body, const WorldIsland& island) {
       body.setDeactivationTime(0);
 }
 
-// Chains of couplings take several passes.
-void keep_coupled_awake(const Couplings& couplings) {
-  for (bool changed = true; changed;) {
+void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies) {
+  std::vector<std::vector<btCollisionObject*>> groups;
+  for (const auto& coupling : couplings.all()) {
+    if (!coupling->is_complete) continue;
+    groups.emplace_back();
+    for (const HeldPoint& point : coupling->points) groups.back().push_back(point.object());
+  }
+  for (const auto& [a, b] : surfaces.neighbours()) {
+    const HeldBody *one = bodies.find(a), *two = bodies.find(b);
+    if (one && two && bodies.is_listed(*one) && bodies.is_listed(*two)) groups.push_back({one->body, two->body});
+  }
+  for (bool changed = true; changed;) {  // chains take several passes
     changed = false;
-    for (const auto& coupling : couplings.all()) {
-      if (!coupling->is_complete) continue;
-      bool restless = false, active = false;
-      for (const HeldPoint& point : coupling->points) {
-        const btCollisionObject& object = *point.object();
-        restless = restless || is_restless(object);
-        active = active || (object.isActive() && !object.isStaticOrKinematicObject());
-      }
+    for (const auto& group : groups) {
+      const bool restless =
+          std::any_of(group.begin(), group.end(), [](const auto* object) { return is_restless(*object); });
+      const bool active = std::any_of(group.begin(), group.end(), [](const auto* object) {
+        return object->isActive() && !object->isStaticOrKinematicObject();
+      });
       if (!restless && !active) continue;
-      for (const HeldPoint& point : coupling->points) {
-        btCollisionObject& object = *point.object();
+      for (btCollisionObject* object : group) {
         const int wanted = restless ? ACTIVE_TAG : WANTS_DEACTIVATION;
-        if (!can_sleep(object) || object.getActivationState() == wanted) continue;
-        object.forceActivationState(wanted);
+        if (!can_sleep(*object) || object->getActivationState() == wanted) continue;
+        object->forceActivationState(wanted);
         changed = true;
       }
     }

@@ -9,6 +9,8 @@ class btSoftBody;
 namespace penalty {
 
 class Couplings;
+class HeldBodies;
+class Surfaces;
 struct WorldIsland;
 
 /// Slower than this [m/s], touching does not wake what sleeps.
@@ -20,8 +22,8 @@ void wake_if_hit(btSoftBody& body);
 /// A soft body sleeps only after what it carries, which in turn waits, as one island of Bullet's, for the soft body.
 void wait_for_carried(btSoftBody& body, const WorldIsland& island);
 
-/// Coupled bodies sleep together or not at all: while one is restless, those that want to sleep stay awake, and keep
-/// the time that they have been at rest, so that all fall asleep when the last of them may.
-void keep_coupled_awake(const Couplings& couplings);
+/// Bodies that are coupled, or might have touched, sleep together or not at all: while one is restless, those that want
+/// to sleep stay awake, and keep the time that they have been at rest, so that all fall asleep when the last of them may.
+void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies);
 
 }  // namespace penalty

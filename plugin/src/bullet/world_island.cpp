@@ -26,6 +26,7 @@ void WorldIsland::absorb(WorldIsland& from) {
   }
   held.insert(held.end(), from.held.begin(), from.held.end());
   couplings.insert(couplings.end(), from.couplings.begin(), from.couplings.end());
+  surfaces.insert(surfaces.end(), from.surfaces.begin(), from.surfaces.end());
   from = {};
 }
 
@@ -42,14 +43,16 @@ void WorldIsland::advance(Real duration, Island& island) {
   island.rigid_bodies.clear();
   for (const TouchedRigidBody& t : touched) island.rigid_bodies.push_back(t.start);
   island.contacts = contacts;
+  island.surfaces.clear();
+  for (std::size_t k = 0; k < held.size(); ++k) held[k]->number = static_cast<int>(k);
+  for (const auto& [pair, a, b] : surfaces) island.surfaces.push_back({pair, a->number, b->number});
   island.couplings.clear();
   for (HeldCoupling* coupling : couplings) {
     for (std::size_t k = 0; k < coupling->points.size(); ++k) {
       const HeldPoint& point = coupling->points[k];
       Side& side = coupling->stepped.points[k];
       if (point.soft) {
-        const auto body = std::find(held.begin(), held.end(), point.soft);
-        side = Side::of_particles(static_cast<int>(body - held.begin()), point.point.point);
+        side = Side::of_particles(point.soft->number, point.point.point);
       } else {
         const auto body = std::find_if(touched.begin(), touched.end(),
                                        [&](const TouchedRigidBody& t) { return t.body == point.rigid; });

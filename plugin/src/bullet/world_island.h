@@ -4,6 +4,7 @@
 
 #include "penalty/stepping/island.h"
 #include "rigid_bodies.h"
+#include "surfaces.h"
 
 namespace penalty {
 
@@ -16,6 +17,7 @@ struct WorldIsland {
   std::vector<TouchedRigidBody> touched;
   std::vector<HeldCoupling*> couplings;
   std::vector<Contact> contacts;
+  std::vector<HeldPair> surfaces;
 
   /// Takes in what `from` holds, which is empty afterwards.
   void absorb(WorldIsland& from);

@@ -117,8 +117,9 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   stepped_.reserve(listed.size());
   for (btSoftBody* body : listed)
     if (bodies->find(*body)) wake_if_hit(*body);
+  Surfaces::wake_touched(*bodies, listed, duration);
   couplings.find_bodies(*bodies, listed);
-  keep_coupled_awake(couplings);
+  keep_awake_together(couplings, surfaces_, *bodies);
   couplings.hold_bodies_of_incomplete();
   for (btSoftBody* body : listed) {
     HeldBody* held = bodies->find(*body);
@@ -126,7 +127,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
     shield([&] { prepare(*held, duration); }, [&](const char* problem) { held->hold(problem, true); });
   }
   couplings.hold_coupled();
-  join_islands();
+  join_islands(duration);
   for (WorldIsland& island : islands_) advance(island, duration);
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) stepped_.push_back(held);
@@ -156,10 +157,12 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   islands_.push_back(std::move(island));
 }
 
-// Bodies that are coupled, or touch the same movable rigid body, are stepped together.
-void AttachedBodies::World::join_islands() {
+// Bodies that are coupled, may touch each other, or touch the same movable rigid body, are stepped together.
+void AttachedBodies::World::join_islands(Real duration) {
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.front()->outcome == StepOutcome::held; });
   couplings.join(islands_, rigid_bodies_);
+  std::erase_if(islands_, [](const WorldIsland& island) { return island.held.empty(); });
+  surfaces_.join(islands_, duration);
   for (std::size_t i = 0; i < islands_.size(); ++i)
     for (std::size_t j = i + 1; j < islands_.size();)
       if (!islands_[j].held.empty() && islands_[i].shares_a_rigid_body_with(islands_[j])) {

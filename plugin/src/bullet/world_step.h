@@ -7,6 +7,7 @@
 #include "couplings.h"
 #include "held_bodies.h"
 #include "rigid_bodies.h"
+#include "surfaces.h"
 #include "world_island.h"
 
 namespace penalty {
@@ -38,10 +39,11 @@ class AttachedBodies::World {
   void hold_all(std::span<btSoftBody* const> listed, const char* problem, bool finite) noexcept;
   void step_all(std::span<btSoftBody* const> listed, Real duration);
   void prepare(HeldBody& held, Real duration);
-  void join_islands();
+  void join_islands(Real duration);
   void advance(WorldIsland& island, Real duration) noexcept;
 
   RigidBodies rigid_bodies_;
+  Surfaces surfaces_;
   std::vector<WorldIsland> islands_;
   Island island_;  // the one that is being advanced; keeps its memory
   std::vector<HeldBody*> stepped_;

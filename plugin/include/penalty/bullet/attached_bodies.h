@@ -2,8 +2,10 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "penalty/bullet/body_surface.h"
 #include "penalty/contact/weighted_point.h"
 #include "penalty/fields/ledger.h"
 #include "penalty/stepping/particles.h"
@@ -20,6 +22,10 @@ struct AttachOptions {
   StepOptions step;
   /// Where the body may touch rigid bodies; empty: every node. Weighted points follow an embedded surface.
   std::vector<WeightedPoint> contact_points = {};
+  /// What touches other soft bodies, and the body itself; empty: its faces, or its links if it has none.
+  BodySurface surface = {};
+  /// Whether it touches itself. Unless said: if its surface is open, as that of cloth is.
+  std::optional<bool> self_contact = {};
 };
 
 /// A point that a coupling holds: a node of an attached soft body, a point between its nodes, or one fixed in a rigid
@@ -83,7 +89,7 @@ class AttachedBodies {
   /// Takes over a soft body that is, or will be, in the world of this solver. A further field for the same body is
   /// added to the first, options then being those of the last call. Throws std::invalid_argument if the field has
   /// another number of particles than the body has nodes, if a node's position, velocity or inverse mass is out of
-  /// range, if another number is, or if the body's world info has no broadphase. The result may be dropped.
+  /// range, if another number or index is, or if the body's world info has no broadphase. The result may be dropped.
   AttachedBody attach(btSoftBody& body, PotentialField field, const AttachOptions& options = {});
 
   /// Gives the body back to Bullet, and lets those that it is coupled to wake in the next step. Detaching a body that

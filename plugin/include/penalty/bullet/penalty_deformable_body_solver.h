@@ -18,7 +18,7 @@ namespace penalty {
 ///
 /// Attached bodies are stepped whole in `predictMotion`, as in PenaltySoftBodySolver, with the same results; they need
 /// no Lagrangian force, not even gravity, which is that of the body's world info. All other deformable bodies, and
-/// contact between soft bodies, stay Bullet's.
+/// contact of attached ones with these, stay Bullet's.
 class PenaltyDeformableBodySolver : public btDeformableBodySolver, public AttachedBodies {
  public:
   PenaltyDeformableBodySolver();
@@ -27,8 +27,8 @@ class PenaltyDeformableBodySolver : public btDeformableBodySolver, public Attach
   void predictMotion(btScalar time_step) override;
   void solveDeformableConstraints(btScalar time_step) override;
   void applyTransforms(btScalar time_step) override;
-  using btDeformableBodySolver::processCollision;
   void processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) override;
+  void processCollision(btSoftBody* body, btSoftBody* other) override;
 
  private:
   bool all_attached() const;
