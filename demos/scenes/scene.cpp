@@ -119,6 +119,7 @@ struct Scene::Impl {
     body->forceActivationState(setup.sleeps ? ACTIVE_TAG : DISABLE_DEACTIVATION);
     world.add(*body);
     AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
+    if (setup.body.surface) attach.surface = BodySurface::of(*setup.body.surface);
     contact_points = attach.contact_points;
     if (contact_points.empty())
       for (int i = 0; i < body->m_nodes.size(); ++i) contact_points.push_back(WeightedPoint::at_particle(i));
