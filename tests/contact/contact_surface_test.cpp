@@ -99,8 +99,8 @@ TEST(ContactSurface, RefusesIndicesOutsideThePoints) {
   EXPECT_EQ(message({{0, 1, 2}}, {}), "contact surface: triangle 0: index 2 is outside the 2 points");
   EXPECT_EQ(message({}, {{0, 1}, {-1, 0}}), "contact surface: edge 1: index -1 is outside the 2 points");
   try {
-    ContactSurface({WeightedPoint::at_particle(0), WeightedPoint::at_particle(7)}, {}, {}, rest);
-    FAIL() << "took a point of no particle";
+    const ContactSurface taken({WeightedPoint::at_particle(0), WeightedPoint::at_particle(7)}, {}, {}, rest);
+    FAIL() << "took a point of no particle, " << taken.points().size();
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(), "contact surface: point 1: index 7 is outside the 2 nodes");
   }

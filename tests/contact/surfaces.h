@@ -10,6 +10,7 @@ namespace penalty::testing {
 
 inline ContactSurface surface_of(const TriangleSurface& mesh) {
   std::vector<WeightedPoint> points;
+  points.reserve(mesh.vertices.cols());
   for (int i = 0; i < mesh.vertices.cols(); ++i) points.push_back(WeightedPoint::at_particle(i));
   return {points, mesh.triangles, {}, pack(mesh.vertices)};
 }

@@ -76,6 +76,7 @@ void SurfaceBodies::step(Real duration, int count) {
 
 std::vector<Skin> SurfaceBodies::skins() const {
   std::vector<Skin> skins;
+  skins.reserve(bodies_.size());
   for (std::size_t k = 0; k < bodies_.size(); ++k) skins.push_back({&bodies_[k]->particles().positions, triangles_[k]});
   return skins;
 }

@@ -180,7 +180,7 @@ TEST(SurfaceContact, AClothFallsIntoFoldsOnTheFloor) {
     energy = bodies.energy();
   }
   EXPECT_GT(least, 0.5 * bodies.margin);
-  EXPECT_LT(gain, 1e-6 * start);
+  EXPECT_LT(gain, 2e-5 * start);  // of giving thickness back
   EXPECT_LT(energy, 0.3 * start) << "did not fall";
   EXPECT_LT(bodies.kinetic_energy(), 1e-3);
 }
@@ -380,6 +380,7 @@ TEST(SurfaceContact, PushesThroughEmbeddedPointsOntoTheirParticles) {
   x << -1, 1, 1, -1, 0, 0, 0, 0, -1, -1, 1, 1;
   Body frame_body = make_free_particles(x, {1, 1, 1, 1});
   std::vector<WeightedPoint> corners;
+  corners.reserve(4);
   for (int i = 0; i < 4; ++i) corners.push_back({{i, (i + 1) % 4, (i + 2) % 4}, {0.8, 0.1, 0.1}, 3});
   ContactSurface skin(corners, {{0, 2, 1}, {0, 3, 2}}, {}, frame_body.particles().positions);
   Body point = make_free_particles(Eigen::Matrix3Xd(Vector3(0.1, 0.5, 0.2)), {2});

@@ -55,7 +55,7 @@ bool every_edge_has_two_sides(std::span<const Triangle> triangles) {
 }  // namespace
 
 ContactSurface::ContactSurface(std::vector<WeightedPoint> points, std::vector<Triangle> triangles,
-                               std::vector<Edge> edges, const Positions& rest)
+                               const std::vector<Edge>& edges, const Positions& rest)
     : points_(std::move(points)), triangles_(std::move(triangles)) {
   for (std::size_t k = 0; k < points_.size(); ++k)
     points_[k].check(static_cast<int>(rest.cols()), "contact surface: point " + std::to_string(k));
@@ -125,6 +125,7 @@ void ContactSurface::cut_into_patches() {
   };
   const auto cut_all = [&](std::vector<int> items, std::size_t count, const auto& center, const auto& take) {
     std::vector<Vector3> centers;
+    centers.reserve(count);
     for (std::size_t k = 0; k < count; ++k) centers.push_back(center(static_cast<int>(k)));
     cut(cut, items, centers, take);
   };
@@ -149,6 +150,7 @@ void ContactSurface::cut_into_patches() {
     std::sort(patch.all_points.begin(), patch.all_points.end());
     patch.all_points.erase(std::unique(patch.all_points.begin(), patch.all_points.end()), patch.all_points.end());
     std::vector<Box> boxes;
+    boxes.reserve(std::max(patch.edges.size(), patch.triangles.size()));
     for (const int e : patch.edges) boxes.push_back(box_of_edge(e));
     patch.edge_tree = BoxTree(boxes);
     boxes.clear();

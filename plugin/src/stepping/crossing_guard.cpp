@@ -1,5 +1,5 @@
 // The part of SurfaceContacts that lets nothing cross.
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -9,8 +9,10 @@
 namespace penalty {
 namespace {
 
-constexpr Real kept_share = 0.1;  // of the distance, or of the thickness, that a drift must leave
-constexpr int extra_sweeps = 8;   // before what fails is frozen
+constexpr Real kept_share = 0.1;    // of the distance, or of the thickness, that a drift must leave
+constexpr Real no_moment = 1e-13;   // of inertia, relative to the largest
+constexpr int extra_sweeps = 8;     // before what fails is frozen
+constexpr int most_freezes = 1000;  // in a step: a body beyond help would take minutes
 
 // Least distance along n of points of the first feature from those of the second.
 Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edges) {
@@ -22,6 +24,7 @@ Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edge
 
 void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
   zone_.clear();
+  if (freezes_ >= most_freezes) return;
   bool collected = true;
   for (int round = 0;; ++round) {
     if (refresh(h, remaining)) collected = false;
@@ -34,6 +37,7 @@ void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>&
       bool hit = false;
       sweep_pairs(h, hit);
     } else {
+      ++freezes_;
       freeze(h);
     }
     take_velocities();
@@ -211,7 +215,14 @@ void SurfaceContacts::make_rigid(std::span<const int> particles) {
     spin += m * arm.cross(velocity(i) - mean);
     inertia += m * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
   }
-  const Vector3 turn = inertia.fullPivLu().solve(spin);
+  // Particles in a line have no moment about it, and nearly none is taken for none: what then turns would gain energy.
+  const Eigen::SelfAdjointEigenSolver<Matrix3> axes(inertia);
+  Vector3 turn = Vector3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 axis = axes.eigenvectors().col(k);
+    if (axes.eigenvalues()[k] > no_moment * axes.eigenvalues()[2])
+      turn += axis.dot(spin) / axes.eigenvalues()[k] * axis;
+  }
   for (const int i : particles) velocity(i) = mean + turn.cross(position(i) - center);
 }
 

@@ -284,8 +284,11 @@ void advance_explicitly(Island& island, Real duration) {
   island.rigid_start = island.rigid_bodies;
   Real noise = 0, tolerance = std::numeric_limits<Real>::infinity();
   int most_substeps = 1;
+  // Pressed flat between others, a body would be unfolded through them.
+  const bool may_unfold = std::all_of(island.surfaces.begin(), island.surfaces.end(),
+                                      [](const SurfaceContact& contact) { return contact.body_a == contact.body_b; });
   for (SteppedBody* body : island.bodies) {
-    begin_step(*body);
+    begin_step(*body, may_unfold);
     noise += body->energy_noise;
     tolerance = std::min(tolerance, body->options.energy_tolerance);
     most_substeps = std::max(most_substeps, body->options.max_substeps);

@@ -11,14 +11,19 @@
 namespace penalty {
 namespace {
 
-bool steps_implicitly(const Island& island, Real duration) {
-  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty() || !island.surfaces.empty())
-    return false;
-  const SteppedBody& body = *island.bodies.front();
+bool wants_implicit_step(const SteppedBody& body, Real duration) {
   if (body.particles.size() == 0) return false;
   if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
   return body.options.substeps == 0 &&
          duration * std::sqrt(body.largest_eigenvalue) / 2 > crossover_substeps * body.options.safety;
+}
+
+bool steps_implicitly(Island& island, Real duration) {
+  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty()) return false;
+  if (!wants_implicit_step(*island.bodies.front(), duration)) return false;
+  SurfaceContacts surfaces(island);
+  surfaces.begin_step(duration);
+  return surfaces.least_substeps() == 1;  // far from itself
 }
 
 StepReport report_of(const Island& island) {

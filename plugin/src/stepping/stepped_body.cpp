@@ -37,10 +37,11 @@ Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Re
   return kick_time / 2 * impulse.dot(inverse_mass * body.forces.col(particle).head<3>() + body.gravity);
 }
 
-Real begin_step(SteppedBody& body) {
+Real begin_step(SteppedBody& body, bool may_unfold) {
   body.report = {};
-  body.report.unfolded = body.options.unfold && unfold(body.particles.positions, body.field->rest_positions(),
-                                                       body.rest_span, body.particles.inverse_masses);
+  body.report.unfolded =
+      may_unfold && body.options.unfold &&
+      unfold(body.particles.positions, body.field->rest_positions(), body.rest_span, body.particles.inverse_masses);
   if (body.report.unfolded) body.positions_changed();
   if (body.field->choose_phase(body.particles.positions) != 0) body.positions_changed();
   body.start.positions = body.particles.positions;

@@ -12,9 +12,9 @@ void evaluate_forces(SteppedBody& body);
 /// Half the work that an impulse on a particle shares with the kick of the body's own forces [J].
 Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Real kick_time);
 
-/// Unfolds it, chooses its phase, keeps the state to go back to, and books what changed since the last step. Returns
-/// kinetic + elastic energy [J].
-Real begin_step(SteppedBody& body);
+/// Unfolds it if it may, chooses its phase, keeps the state to go back to, and books what changed since the last step.
+/// Returns kinetic + elastic energy [J].
+Real begin_step(SteppedBody& body, bool may_unfold = true);
 
 /// Goes back to the state that `begin_step` kept.
 void undo_step(SteppedBody& body);

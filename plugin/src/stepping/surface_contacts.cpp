@@ -7,13 +7,15 @@
 namespace penalty {
 namespace {
 
-constexpr Real recovery_time = 0.05;   // in which lost thickness comes back [s],
-constexpr Real recovery_speed = 0.02;  // no faster than this [m/s]
-constexpr Real exit_speed = 0.2;       // of what is led out of a closed surface, at most [m/s]
-constexpr Real slop = 0.02;            // share of the thickness that may be lost
-constexpr Real step_share = 0.5;       // of the thickness that a substep may bring surfaces closer
-constexpr int most_substeps = 400;     // to that end; beyond it the guard has more to do
-constexpr int fewest_substeps = 16;    // of a step in which surfaces are near
+constexpr Real recovery_time = 0.05;    // in which lost thickness comes back [s],
+constexpr Real recovery_speed = 0.02;   // no faster than this [m/s]
+constexpr Real exit_speed = 0.2;        // of what is led out of a closed surface, at most [m/s]
+constexpr Real slop = 0.02;             // share of the thickness that may be lost
+constexpr Real step_share = 0.5;        // of the thickness that a substep may bring surfaces closer
+constexpr Real common_direction = 0.2;  // share of the depths that must agree where enclosed points are led out
+constexpr int most_substeps = 400;      // to that end; beyond it the guard has more to do
+constexpr int fewest_substeps = 16;     // of a step in which surfaces are near
+constexpr Real least_mobility = 1e-6;   // that is left without turning, relative to that with it
 constexpr int most_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.1;  // and by no more than that of the first,
@@ -116,28 +118,30 @@ void SurfaceContacts::collect() {
       const ClosestPoints closest = contact.pair->closest(q);
       if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
       const Real limit = q.thickness + reach;
-      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, false);
+      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr);
     });
-    for (const EnclosedPoint& enclosed : contact.pair->enclosed()) lead_out(contact, enclosed);
+    if (!contact.pair->enclosed().empty()) lead_out(contact);
   }
 }
 
 void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest,
-                          bool leads_out) {
+                          const Vector3* leads_out) {
   const SurfacePair& surfaces = *contact.pair;
   const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
   TouchingPair pair{.begin = scratch_.particles.size(),
                     .difference = closest.difference,
                     .thickness = q.thickness,
                     .friction = surfaces.friction(),
-                    .leads_out = leads_out,
+                    .leads_out = leads_out != nullptr,
                     .body_a = contact.body_a,
                     .body_b = contact.body_b};
   const Real distance = closest.difference.norm();
   pair.gap = (leads_out ? -distance : distance) - q.thickness;
-  if (!surfaces.has_no_direction(q, distance)) {
-    pair.normal = closest.difference / (leads_out ? -distance : distance);  // the difference points inwards
-  } else {                                                                  // a closed surface knows its outside
+  if (leads_out) {
+    pair.normal = *leads_out;
+  } else if (!surfaces.has_no_direction(q, distance)) {
+    pair.normal = closest.difference / distance;
+  } else {  // a closed surface knows its outside
     if (q.are_edges || !two.is_closed()) return;
     const Vector3 a = two.position(q.points[1]);
     pair.normal = (two.position(q.points[2]) - a).cross(two.position(q.points[3]) - a).normalized();
@@ -192,20 +196,47 @@ void SurfaceContacts::add_particles(const WeightedPoint& point, Real weight, int
   }
 }
 
-void SurfaceContacts::lead_out(const SurfaceContact& contact, const EnclosedPoint& enclosed) {
-  const SurfacePair& pair = *contact.pair;
-  ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
-  const ContactSurface::Nearest nearest =
-      around.nearest((enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point));
-  if (nearest.triangle < 0) return;
-  const auto& [t0, t1, t2] = around.triangles()[nearest.triangle];
-  const Vector3 outwards = (around.position(t1) - around.position(t0)).cross(around.position(t2) - around.position(t0));
-  add(contact,
-      {.points = {enclosed.point, t0, t1, t2},
-       .are_edges = false,
-       .from_b = enclosed.of_b,
-       .thickness = pair.thickness()},
-      nearest.closest, nearest.closest.difference.dot(outwards) < 0);
+// All in one direction, in which most of them have the shortest way out: each by its own, they would tear the body apart.
+// Where there is no such direction they stay.
+void SurfaceContacts::lead_out(const SurfaceContact& contact) {
+  SurfacePair& pair = *contact.pair;
+  struct Way {
+    FeaturePair features;
+    ClosestPoints closest;
+    bool is_inside;
+  };
+  std::vector<Way> ways;
+  Vector3 direction = Vector3::Zero();  // of a against b
+  Real depths = 0;
+  for (const EnclosedPoint& enclosed : pair.enclosed()) {
+    ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
+    const ContactSurface::Nearest nearest =
+        around.nearest((enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point));
+    if (nearest.triangle < 0) continue;
+    const auto& [t0, t1, t2] = around.triangles()[nearest.triangle];
+    const Vector3& inwards = nearest.closest.difference;
+    const Vector3 outwards =
+        (around.position(t1) - around.position(t0)).cross(around.position(t2) - around.position(t0));
+    ways.push_back({{.points = {enclosed.point, t0, t1, t2},
+                     .are_edges = false,
+                     .from_b = enclosed.of_b,
+                     .thickness = pair.thickness()},
+                    nearest.closest,
+                    inwards.dot(outwards) < 0});
+    if (!ways.back().is_inside) continue;
+    direction += enclosed.of_b ? inwards : Vector3(-inwards);
+    depths += inwards.norm();
+  }
+  const Real size = direction.norm();
+  if (!(size > common_direction * depths)) return;
+  direction /= size;
+  for (const Way& way : ways)
+    if (way.is_inside) {
+      const Vector3 out = way.features.from_b ? Vector3(-direction) : direction;
+      add(contact, way.features, way.closest, &out);
+    } else {
+      add(contact, way.features, way.closest, nullptr);
+    }
 }
 
 Vector3 SurfaceContacts::relative_velocity(const TouchingPair& pair) const {
@@ -231,12 +262,32 @@ bool SurfaceContacts::converge(Real h, const std::function<void()>& rigid_sweep)
   return changed || !island_.contacts.empty();
 }
 
-// Whoever drives particles that are held does the work of what they give.
-void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3& direction) {
+// How a unit impulse along `direction`, given at two points that are not on a line along it, turns the particles of the
+// pair [rad/s / (N s)]; zero where something is held, which takes up any moment, or nearly no moment is needed.
+Vector3 SurfaceContacts::turn_of(TouchingPair& pair, const Vector3& direction) const {
+  if (!pair.has_inertia) find_inertia(pair);
+  return pair.can_turn ? Vector3(pair.inverse_inertia * pair.difference.cross(direction)) : Vector3(Vector3::Zero());
+}
+
+// Angular momentum of the particles about their centre, if it is asked for [kg m²/s].
+Vector3 SurfaceContacts::spin_of(const TouchingPair& pair, const Vector3& turn) const {
+  Vector3 spin = Vector3::Zero();
+  if (turn.isZero(0)) return spin;
+  for (std::size_t k = pair.begin; k < pair.end; ++k) {
+    const TouchingParticle& p = scratch_.particles[k];
+    spin += (vector(p.position) - pair.center).cross(Vector3(vector(p.velocity))) / p.inverse_mass;
+  }
+  return spin;
+}
+
+// Without the rotation `turn` that a unit impulse would give. Whoever drives particles that are held does the work of
+// what they give.
+void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn) {
   for (std::size_t k = pair.begin; k < pair.end; ++k) {
     const TouchingParticle& p = scratch_.particles[k];
     if (p.inverse_mass > 0)
-      vector(p.velocity) += p.weight * p.inverse_mass * impulse * direction;
+      vector(p.velocity) +=
+          impulse * (p.weight * p.inverse_mass * direction - turn.cross(Vector3(vector(p.position)) - pair.center));
     else
       outside_work_ -= p.weight * impulse * direction.dot(vector(p.velocity));
   }
@@ -247,7 +298,8 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
   Real worst = 0;
   for (TouchingPair& pair : scratch_.pairs) {
     const Vector3 velocity = relative_velocity(pair);
-    const Real speed = pair.normal.dot(velocity);
+    const Vector3 turn = pair.leads_out ? turn_of(pair, pair.normal) : Vector3(Vector3::Zero());
+    const Real speed = pair.normal.dot(velocity) - turn.dot(spin_of(pair, turn));
     Real wanted = -pair.gap / h;
     if (wanted > 0)
       wanted = std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
@@ -255,14 +307,16 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
     if (speed >= wanted) continue;
     hit = true;
     worst = std::max(worst, (wanted - speed) * h / pair.thickness);
-    const Real impulse = (wanted - speed) / pair.mobility;
-    push(pair, impulse, pair.normal);
+    const Real mobility = pair.mobility - pair.difference.cross(pair.normal).dot(turn);
+    if (!(mobility > least_mobility * pair.mobility)) continue;
+    const Real impulse = (wanted - speed) / mobility;
+    push(pair, impulse, pair.normal, turn);
     const Real recovery = std::max<Real>(impulse * wanted, 0);  // as of a surface that moves so fast
     outside_work_ += recovery;
     const Real loss = recovery - impulse * (speed + wanted) / 2;
     island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
     island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
-    if (pair.friction > 0) rub(pair, impulse, velocity - speed * pair.normal);
+    if (pair.friction > 0 && !pair.leads_out) rub(pair, impulse, velocity - speed * pair.normal);
   }
   return worst;
 }
@@ -272,7 +326,8 @@ void SurfaceContacts::find_inertia(TouchingPair& pair) const {
   const std::span<const TouchingParticle> particles(&scratch_.particles[pair.begin], pair.end - pair.begin);
   Real mass = 0;
   for (const TouchingParticle& p : particles) {
-    if (!(p.inverse_mass > 0)) return;
+    pair.is_held = pair.is_held || !(p.inverse_mass > 0);
+    if (pair.is_held) return;
     mass += 1 / p.inverse_mass;
     pair.center += vector(p.position) / p.inverse_mass;
   }
@@ -291,36 +346,21 @@ void SurfaceContacts::find_inertia(TouchingPair& pair) const {
 // A pinned particle takes up any moment; particles in one line have none about it to speak of, and no friction.
 void SurfaceContacts::rub(TouchingPair& pair, Real normal_impulse, Vector3 slip) {
   if (!pair.has_inertia) find_inertia(pair);
-  const std::span<const TouchingParticle> particles(&scratch_.particles[pair.begin], pair.end - pair.begin);
-  Vector3 turn = Vector3::Zero();  // of the particles, that a unit impulse along the slip gives [rad/s / (N s)]
-  Vector3 direction = Vector3::Zero();
-  Real mobility = pair.mobility, slip_speed = 0;
   constexpr Real no_slip = 1e-12;
   if (pair.can_turn) {
-    Vector3 spin = Vector3::Zero();
-    for (const TouchingParticle& p : particles)
-      spin += (vector(p.position) - pair.center).cross(Vector3(vector(p.velocity))) / p.inverse_mass;
+    const Vector3 spin = spin_of(pair, pair.normal);
     slip -= (pair.inverse_inertia * spin).cross(pair.difference);
     slip -= pair.normal.dot(slip) * pair.normal;
-    slip_speed = slip.norm();
-    if (!(slip_speed > no_slip)) return;
-    direction = slip / slip_speed;
-    const Vector3 moment = pair.difference.cross(direction);
-    turn = pair.inverse_inertia * moment;
-    mobility -= moment.dot(turn);
-    if (!(mobility > 1e-6 * pair.mobility)) return;
-  } else {
-    const bool is_held = std::any_of(particles.begin(), particles.end(),
-                                     [](const TouchingParticle& p) { return !(p.inverse_mass > 0); });
-    slip_speed = slip.norm();
-    if (!is_held || !(slip_speed > no_slip)) return;
-    direction = slip / slip_speed;
+  } else if (!pair.is_held) {
+    return;
   }
+  const Real slip_speed = slip.norm();
+  if (!(slip_speed > no_slip)) return;
+  const Vector3 direction = slip / slip_speed, turn = turn_of(pair, direction);
+  const Real mobility = pair.mobility - pair.difference.cross(direction).dot(turn);
+  if (!(mobility > least_mobility * pair.mobility)) return;
   const Real impulse = std::min(pair.friction * normal_impulse, slip_speed / mobility);
-  push(pair, -impulse, direction);
-  if (pair.can_turn)
-    for (const TouchingParticle& p : particles)
-      vector(p.velocity) += impulse * turn.cross(Vector3(vector(p.position)) - pair.center);
+  push(pair, -impulse, direction, turn);
   const Real loss = impulse * (slip_speed - impulse * mobility / 2);
   island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
   island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;

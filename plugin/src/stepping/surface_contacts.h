@@ -19,7 +19,7 @@ struct TouchingPair {
   int body_a = 0, body_b = 0;  // half of what is lost is booked to each
 
   // What friction needs, found when it is needed first: see SurfaceContacts::rub.
-  bool has_inertia = false, can_turn = false;
+  bool has_inertia = false, is_held = false, can_turn = false;
   Vector3 center = Vector3::Zero();
   Matrix3 inverse_inertia = Matrix3::Zero();
 };
@@ -59,8 +59,8 @@ struct SurfaceScratch {
 /// both ends are separated throughout. What fails is swept again; what fails still moves on as one rigid body, which
 /// keeps both momenta where nothing is held.
 ///
-/// What starts out pierced is left to pass; points inside a closed surface are led to the nearest place of it, at
-/// 0.2 m/s at most.
+/// What starts out pierced is left to pass; points inside a closed surface are led out of it, all in one direction,
+/// at 0.2 m/s at most.
 class SurfaceContacts {
  public:
   explicit SurfaceContacts(Island& island);
@@ -102,11 +102,13 @@ class SurfaceContacts {
   bool refresh(Real h, Real remaining);
   bool converge(Real h, const std::function<void()>& rigid_sweep);
   void collect();
-  void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, bool leads_out);
+  void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
-  void lead_out(const SurfaceContact& contact, const EnclosedPoint& enclosed);
+  void lead_out(const SurfaceContact& contact);
   Real sweep_pairs(Real h, bool& hit);
-  void push(const TouchingPair& pair, Real impulse, const Vector3& direction);
+  Vector3 turn_of(TouchingPair& pair, const Vector3& direction) const;
+  Vector3 spin_of(const TouchingPair& pair, const Vector3& turn) const;
+  void push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn);
   void rub(TouchingPair& pair, Real normal_impulse, Vector3 slip);
   void find_inertia(TouchingPair& pair) const;
   Vector3 relative_velocity(const TouchingPair& pair) const;
@@ -131,6 +133,7 @@ class SurfaceContacts {
   std::vector<char> may_touch_;            // each body
   std::vector<Real> lost_thickness_;       // of each body, the most in this step [m]
   int least_substeps_ = 1;
+  int freezes_ = 0;  // of the guard in this step, attempts that were undone included
   Real outside_work_ = 0;
 };
 

@@ -34,7 +34,7 @@ class ContactSurface {
   /// and no triangle may touch triangles, too. A closed surface whose triangles look inwards is turned. Throws
   /// std::invalid_argument that names a point that is none of the particles, a triangle or edge whose index is outside
   /// the points.
-  ContactSurface(std::vector<WeightedPoint> points, std::vector<Triangle> triangles, std::vector<Edge> edges,
+  ContactSurface(std::vector<WeightedPoint> points, std::vector<Triangle> triangles, const std::vector<Edge>& edges,
                  const Positions& rest);
 
   std::span<const WeightedPoint> points() const { return points_; }

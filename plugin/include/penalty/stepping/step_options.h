@@ -7,7 +7,7 @@ namespace penalty {
 enum class Integrator {
   automatic,      // explicit up to `crossover_substeps`, else implicit
   explicit_step,  // sub-cycled velocity Verlet
-  implicit_step,  // backward Euler; where something touches the body or couples it to others, and for what may touch itself: explicit
+  implicit_step,  // backward Euler; where something touches the body or couples it to others, or where it is near itself: explicit
 };
 
 /// Substeps up to which sub-cycling costs less than an implicit step with its default options: as many were measured to
