@@ -49,8 +49,10 @@ class Layers {
     Real sum = 0;
     for (const auto& [i, j] : edges_) sum += (sheet.vertices.col(i) - sheet.vertices.col(j)).norm();
     kept_ = std::min(margin, kept_share * sum / static_cast<Real>(edges_.size()));
+    const PackedVectors start = pack(sheet.vertices);
     std::vector<Box> boxes;
-    for (const Triangle& t : sheet.triangles) boxes.push_back(box_of(pack(sheet.vertices), t));
+    boxes.reserve(sheet.triangles.size());
+    for (const Triangle& t : sheet.triangles) boxes.push_back(box_of(start, t));
     tree_ = BoxTree(boxes);
   }
 

@@ -150,6 +150,8 @@ void Sequence::mend() {
   for (const auto& body : bodies_) {
     btSoftBody& soft = *body->soft;
     soft.getCollisionShape()->setMargin(btScalar(0.02));
+    // All lie in one place now, and would meet.
+    soft.setCollisionFlags(soft.getCollisionFlags() | btCollisionObject::CF_NO_CONTACT_RESPONSE);
     for (int i = 0; i < std::min(soft.m_nodes.size(), static_cast<int>(body->mesh.vertices.cols())); ++i) {
       btSoftBody::Node& node = soft.m_nodes[i];
       node.m_x = to_bullet(body->mesh.vertices.col(i));

@@ -10,6 +10,8 @@
 namespace penalty {
 namespace {
 
+constexpr Real least_weight = 1e-6;  // round-off of points on a face
+
 void check_points(const std::vector<WeightedPoint>& points, int num_particles, const char* which) {
   for (std::size_t k = 0; k < points.size(); ++k)
     points[k].check(num_particles, std::string("attach: ") + which + " point " + std::to_string(k));
@@ -17,6 +19,12 @@ void check_points(const std::vector<WeightedPoint>& points, int num_particles, c
 
 void check_surface(const BodySurface& surface, int num_particles) {
   check_points(surface.points, num_particles, "surface");
+  for (std::size_t k = 0; k < surface.points.size(); ++k)
+    for (int i = 0; i < surface.points[k].size; ++i)
+      if (surface.points[k].weights[i] < -least_weight)
+        throw std::invalid_argument("attach: surface point " + std::to_string(k) + ": weight " +
+                                    to_text(surface.points[k].weights[i]) +
+                                    " is negative: it lies outside the particles that carry it");
   const std::size_t num_points = surface.points.size();
   for (std::size_t t = 0; t < surface.triangles.size(); ++t)
     for (const int point : surface.triangles[t])

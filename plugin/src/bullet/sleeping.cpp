@@ -60,7 +60,11 @@ void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, c
   }
   for (const auto& [a, b] : surfaces.neighbours()) {
     const HeldBody *one = bodies.find(a), *two = bodies.find(b);
-    if (one && two && bodies.is_listed(*one) && bodies.is_listed(*two)) groups.push_back({one->body, two->body});
+    const bool has_one = one && bodies.is_listed(*one), has_two = two && bodies.is_listed(*two);
+    if (has_one && has_two)
+      groups.push_back({one->body, two->body});
+    else if (has_one || has_two)  // the other is gone, which may have carried it
+      (has_one ? one : two)->body->activate(true);
   }
   for (bool changed = true; changed;) {  // chains take several passes
     changed = false;

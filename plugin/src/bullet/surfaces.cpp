@@ -15,12 +15,18 @@ namespace {
 
 Real margin_of(const HeldBody& held) { return held.body->getCollisionShape()->getMargin(); }
 
+constexpr Real largest_way = 1e3;  // in a step [m]
+
 /// Where a body is, and how far it may come in a step [m].
 struct Extent {
   Box box;
   Real way = 0;
 
-  bool is_finite() const { return std::isfinite(box.low.sum() + box.high.sum() + way); }
+  /// What would cross the world in a step meets nobody: it would take all the others into its island, and down with it.
+  bool is_sane() const {
+    return std::isfinite(box.low.sum() + box.high.sum() + way) &&
+           way <= std::max(largest_way, 100 * (box.high - box.low).norm());
+  }
   Box swept() const {
     Box swept = box;
     swept.low.array() -= way;
@@ -33,15 +39,17 @@ struct Extent {
 Extent extent_of(const HeldBody& held, std::span<const TouchedRigidBody> touched, Real duration) {
   const SteppedBody& stepped = held.stepped;
   Extent extent;
-  Real fastest2 = 0;
+  Real fastest2 = 0, pushed = 0;
   for (int i = 0; i < stepped.particles.size(); ++i) {
     extent.box.add(stepped.particles.positions.col(i).head<3>());
     fastest2 = std::max(fastest2, stepped.particles.velocities.col(i).head<3>().squaredNorm());
+    if (stepped.external_forces.size() != 0)
+      pushed = std::max(pushed, stepped.particles.inverse_masses[i] * stepped.external_forces.col(i).norm());
   }
   if (stepped.mass > 0) fastest2 += 2 * std::max<Real>(held.stepped.elastic_energy, 0) / stepped.mass;
   Real fastest = std::sqrt(fastest2);
   for (const TouchedRigidBody& t : touched) fastest = std::max(fastest, t.start.velocity.norm());
-  extent.way = fastest * duration + stepped.gravity.norm() * duration * duration + margin_of(held);
+  extent.way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration + margin_of(held);
   return extent;
 }
 
@@ -168,9 +176,10 @@ void Surfaces::wake_touched(const HeldBodies& bodies, std::span<btSoftBody* cons
     }
   if (!any_asleep) return;
   std::vector<Extent> extents;
+  extents.reserve(held.size());
   for (const HeldBody* h : held) extents.push_back(extent_of_nodes(*h, duration));
   for (Extent& extent : extents)
-    if (!extent.is_finite()) extent = {};  // meets nobody
+    if (!extent.is_sane()) extent = {};
   const auto pairs = overlaps(extents);
   for (bool changed = true; changed;) {
     changed = false;
@@ -204,14 +213,19 @@ void Surfaces::join(std::vector<WorldIsland>& islands, Real duration) {
   std::vector<HeldBody*> held;
   std::vector<int> island_of;
   std::vector<Extent> extents;
-  for (std::size_t k = 0; k < islands.size(); ++k)
+  for (std::size_t k = 0; k < islands.size(); ++k) {
+    Real way = 0;  // what is coupled may come as far as the other
+    const std::size_t first = held.size();
     for (HeldBody* body : islands[k].held) {
       const Extent extent = extent_of(*body, islands[k].touched, duration);
-      if (!body->body->hasContactResponse() || !extent.is_finite()) continue;
+      if (!body->body->hasContactResponse() || !extent.is_sane()) continue;
       held.push_back(body);
       island_of.push_back(static_cast<int>(k));
       extents.push_back(extent);
+      way = std::max(way, extent.way);
     }
+    for (std::size_t i = first; i < extents.size(); ++i) extents[i].way = way;
+  }
   std::vector<int> joined(islands.size());  // into which island
   std::iota(joined.begin(), joined.end(), 0);
   const auto root = [&](int island) {
