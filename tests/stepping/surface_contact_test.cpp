@@ -256,6 +256,22 @@ TEST(SurfaceContact, WhatStartsPiercedComesApartGently) {
   EXPECT_GT(least_distance(bodies.skins(), false), 0.9 * bodies.margin);
 }
 
+TEST(SurfaceContact, WhatStartsPiercedDeeplyIsNotTornApart) {
+  // Half way through each other: they may stay, but not take energy from the way out.
+  for (const Real stiffness : {5.0, 50.0}) {
+    SurfaceBodies bodies;
+    const TetMesh ball = make_ball(0.3, 2);
+    bodies.add(ball, stiffness, 1, {.shift = {-0.1, 0, 0}});
+    bodies.add(ball, stiffness, 1, {.shift = {0.1, 0.03, 0.01}});
+    for (int k = 0; k < 120; ++k) {
+      bodies.step();
+      ASSERT_LT(bodies.energy(), 0.5) << "frame " << k;  // of 2 kg
+    }
+    EXPECT_LT(bodies.momentum().linear.norm(), 1e-13);
+    EXPECT_LT(bodies.momentum().angular.norm(), 1e-13);
+  }
+}
+
 TEST(SurfaceContact, BoxesWhoseFacesCoincideAreBesideEachOther) {
   // No distance, no direction: the outside of a closed surface decides.
   SurfaceBodies bodies;

@@ -10,6 +10,7 @@ namespace {
 constexpr Real recovery_time = 0.05;    // in which lost thickness comes back [s],
 constexpr Real recovery_speed = 0.02;   // no faster than this [m/s]
 constexpr Real exit_speed = 0.2;        // of what is led out of a closed surface, at most [m/s]
+constexpr Real exit_acceleration = 20;  // likewise [m/s²]: what is pressed in stays
 constexpr Real slop = 0.02;             // share of the thickness that may be lost
 constexpr Real step_share = 0.5;        // of the thickness that a substep may bring surfaces closer
 constexpr Real common_direction = 0.2;  // share of the depths that must agree where enclosed points are led out
@@ -305,15 +306,21 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
       wanted = std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
                                 pair.leads_out ? exit_speed : recovery_speed);
     if (speed >= wanted) continue;
-    hit = true;
-    worst = std::max(worst, (wanted - speed) * h / pair.thickness);
     const Real mobility = pair.mobility - pair.difference.cross(pair.normal).dot(turn);
     if (!(mobility > least_mobility * pair.mobility)) continue;
-    const Real impulse = (wanted - speed) / mobility;
+    Real impulse = (wanted - speed) / mobility;
+    if (pair.leads_out) {
+      impulse = std::min(impulse, exit_acceleration * h / mobility - pair.given);
+      if (!(impulse > 0)) continue;
+      pair.given += impulse;
+    }
+    const Real reached = speed + impulse * mobility;
+    hit = true;
+    worst = std::max(worst, (reached - speed) * h / pair.thickness);
     push(pair, impulse, pair.normal, turn);
-    const Real recovery = std::max<Real>(impulse * wanted, 0);  // as of a surface that moves so fast
+    const Real recovery = std::max<Real>(impulse * reached, 0);  // as of a surface that moves so fast
     outside_work_ += recovery;
-    const Real loss = recovery - impulse * (speed + wanted) / 2;
+    const Real loss = recovery - impulse * (speed + reached) / 2;
     island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
     island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
     if (pair.friction > 0 && !pair.leads_out) rub(pair, impulse, velocity - speed * pair.normal);
