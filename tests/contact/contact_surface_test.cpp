@@ -88,9 +88,9 @@ TEST(ContactSurface, MovesWithItsParticles) {
 TEST(ContactSurface, RefusesIndicesOutsideThePoints) {
   const PackedVectors rest = PackedVectors::Zero(4, 2);
   const std::vector<WeightedPoint> points{WeightedPoint::at_particle(0), WeightedPoint::at_particle(1)};
-  const auto message = [&](std::vector<Triangle> triangles, std::vector<Edge> edges) -> std::string {
+  const auto message = [&](const std::vector<Triangle>& triangles, const std::vector<Edge>& edges) -> std::string {
     try {
-      ContactSurface(points, std::move(triangles), std::move(edges), rest);
+      const ContactSurface taken(points, triangles, edges, rest);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
