@@ -9,10 +9,10 @@
 namespace penalty {
 namespace {
 
-constexpr Real kept_share = 0.1;    // of the distance, or of the thickness, that a drift must leave
-constexpr Real no_moment = 1e-13;   // of inertia, relative to the largest
-constexpr int extra_sweeps = 8;     // before what fails is frozen
-constexpr int most_freezes = 1000;  // in a step: a body beyond help would take minutes
+constexpr Real kept_share = 0.1;   // of the distance, or of the thickness, that a drift must leave
+constexpr Real no_moment = 1e-13;  // of inertia, relative to the largest
+constexpr int extra_sweeps = 8;    // before what fails is frozen
+constexpr long most_tests = 20000, most_tests_of_particle = 100;  // of pairs, for zones, in a step
 
 // Least distance along n of points of the first feature from those of the second.
 Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edges) {
@@ -24,7 +24,7 @@ Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edge
 
 void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
   zone_.clear();
-  if (freezes_ >= most_freezes) return;
+  if (is_beyond_help()) return;
   bool collected = true;
   for (int round = 0;; ++round) {
     if (refresh(h, remaining)) collected = false;
@@ -37,11 +37,16 @@ void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>&
       bool hit = false;
       sweep_pairs(h, hit);
     } else {
-      ++freezes_;
       freeze(h);
+      if (is_beyond_help()) return;
     }
     take_velocities();
   }
+}
+
+// A body that is torn to pieces would take minutes, and nothing comes of it.
+bool SurfaceContacts::is_beyond_help() const {
+  return freezing_tests_ > most_tests + most_tests_of_particle * static_cast<long>(first_particle_.back());
 }
 
 void SurfaceContacts::find_failing(Real h) {
@@ -165,6 +170,8 @@ void SurfaceContacts::freeze(Real h) {
         again.insert(again.end(), pairs_of[particle].begin(), pairs_of[particle].end());
     }
     take_velocities();
+    freezing_tests_ += static_cast<long>(again.size());
+    if (is_beyond_help()) return;
     for (const FailingPair& pair : again)
       if (!is_in_one_zone(pair) && !is_safe(*pair.contact, *pair.features, h)) failing.push_back(pair);
   }

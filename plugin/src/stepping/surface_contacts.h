@@ -116,6 +116,7 @@ class SurfaceContacts {
 
   // The guard.
   void guard(Real h, Real remaining, const std::function<void()>& rigid_sweep);
+  bool is_beyond_help() const;
   void find_failing(Real h);
   bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;
   void freeze(Real h);
@@ -134,7 +135,7 @@ class SurfaceContacts {
   std::vector<char> may_touch_;            // each body
   std::vector<Real> lost_thickness_;       // of each body, the most in this step [m]
   int least_substeps_ = 1;
-  int freezes_ = 0;  // of the guard in this step, attempts that were undone included
+  long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step
   Real outside_work_ = 0;
 };
 
