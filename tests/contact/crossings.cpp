@@ -69,7 +69,8 @@ int count_crossings(std::span<const Skin> skins) {
   for (const Skin& pierced : skins) {
     const Sorted sorted(pierced);
     for (const Skin& skin : skins)
-      for (const auto& [i, j] : edges_of(std::span<const Triangle>(skin.triangles))) {
+      for (const Edge& edge : edges_of(std::span<const Triangle>(skin.triangles))) {
+        const int i = edge[0], j = edge[1];
         const Vector3 p = at(skin, i), q = at(skin, j);
         sorted.visit(std::min(p.x(), q.x()), std::max(p.x(), q.x()), [&](std::size_t k) {
           const Triangle& t = pierced.triangles[k];
