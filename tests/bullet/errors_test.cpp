@@ -163,6 +163,9 @@ TEST_P(Refused, ASurfaceThatIsNotOfTheBody) {
   AttachOptions options;
   options.surface.points = {WeightedPoint::at_particle(0), WeightedPoint::at_particle(13)};
   EXPECT_EQ(attaching_with(options), "attach: surface point 1: index 13 is outside the 13 nodes");
+  options.surface.points[1] = {{0, 1}, {1.5, -0.5}, 2};
+  EXPECT_EQ(attaching_with(options),
+            "attach: surface point 1: weight -0.5 is negative: it lies outside the particles that carry it");
   options.surface.points[1] = WeightedPoint::at_particle(1);
   options.surface.triangles = {{0, 1, 2}};
   EXPECT_EQ(attaching_with(options), "attach: surface triangle 0: index 2 is outside the 2 surface points");

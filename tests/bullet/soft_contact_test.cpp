@@ -285,6 +285,18 @@ TEST_P(SleepingInContact, BodiesThatTouchFallAsleepTogetherAndWakeTogether) {
   EXPECT_GT(lowest(third), 0.7);
 }
 
+TEST_P(SleepingInContact, ASleeperFallsWhenTheOneBelowItGoes) {
+  const auto [lower, upper] = add_ball_over_ball();  // the lower one is pinned
+  sim.step(frame, 3);
+  for (btSoftBody* body : {lower, upper}) body->forceActivationState(ISLAND_SLEEPING);
+  sim.step(frame, 3);
+  ASSERT_FALSE(upper->isActive());
+  const Real height = lowest(*upper);
+  sim.remove(*lower);
+  sim.step(frame, 30);
+  EXPECT_LT(lowest(*upper), height - 0.5);
+}
+
 TEST_P(SleepingInContact, WhatIsThrownAtASleeperHitsIt) {
   // The application throws it between two steps: 0.5 m in one.
   const TetMesh box = make_box({0.4, 0.4, 0.4}, {2, 2, 2});

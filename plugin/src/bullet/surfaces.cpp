@@ -94,7 +94,7 @@ std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
       edges.push_back({point_at(body.m_links[k].m_n[0]), point_at(body.m_links[k].m_n[1])});
   if (triangles.empty() && edges.empty())
     for (int i = 0; i < body.m_nodes.size(); ++i) point_at(&body.m_nodes[i]);
-  return std::make_shared<ContactSurface>(std::move(points), std::move(triangles), std::move(edges), rest);
+  return std::make_shared<ContactSurface>(std::move(points), std::move(triangles), edges, rest);
 }
 
 // Made anew when the application has added faces or links.
@@ -208,7 +208,7 @@ SurfacePair& Surfaces::pair_of(HeldBody& first, HeldBody& second) {
   return *entry->second.pair;
 }
 
-void Surfaces::join(std::vector<WorldIsland>& islands, Real duration) {
+void Surfaces::join(std::vector<WorldIsland>& islands, const HeldBodies& bodies, Real duration) {
   for (auto& [key, entry] : entries_) entry.is_used = false;
   std::vector<HeldBody*> held;
   std::vector<int> island_of;
@@ -249,7 +249,15 @@ void Surfaces::join(std::vector<WorldIsland>& islands, Real duration) {
   for (std::size_t k = 0; k < islands.size(); ++k)
     if (const int into = root(static_cast<int>(k)); into != static_cast<int>(k)) islands[into].absorb(islands[k]);
   std::erase_if(islands, [](const WorldIsland& island) { return island.held.empty(); });
-  std::erase_if(entries_, [](const auto& entry) { return !entry.second.is_used; });
+  // Who sleeps on another is to wake when that one goes.
+  const auto sleeps = [&](const Identity& name) {
+    const HeldBody* body = bodies.find(name);
+    return body && bodies.is_listed(*body) && !body->body->isActive();
+  };
+  std::erase_if(entries_, [&](const auto& entry) {
+    const auto& [a, b] = entry.second.bodies;
+    return !entry.second.is_used && !(sleeps(a) && sleeps(b));
+  });
 }
 
 std::vector<std::array<Identity, 2>> Surfaces::neighbours() const {

@@ -32,9 +32,9 @@ class Surfaces {
   static void wake_touched(const HeldBodies& bodies, std::span<btSoftBody* const> listed, Real duration);
 
   /// Adds pairs to the islands, and makes one island of those whose bodies may touch within `duration` [s].
-  void join(std::vector<WorldIsland>& islands, Real duration);
+  void join(std::vector<WorldIsland>& islands, const HeldBodies& bodies, Real duration);
 
-  /// Bodies that might have touched in the last step.
+  /// Bodies that might have touched in the last step, or when both fell asleep.
   std::vector<std::array<Identity, 2>> neighbours() const;
 
  private:

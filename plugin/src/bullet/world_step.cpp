@@ -162,7 +162,7 @@ void AttachedBodies::World::join_islands(Real duration) {
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.front()->outcome == StepOutcome::held; });
   couplings.join(islands_, rigid_bodies_);
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.empty(); });
-  surfaces_.join(islands_, duration);
+  surfaces_.join(islands_, *bodies, duration);
   for (std::size_t i = 0; i < islands_.size(); ++i)
     for (std::size_t j = i + 1; j < islands_.size();)
       if (!islands_[j].held.empty() && islands_[i].shares_a_rigid_body_with(islands_[j])) {

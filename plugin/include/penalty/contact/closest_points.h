@@ -7,7 +7,7 @@
 namespace penalty {
 
 /// The closest points of two features that have four points p between them: sum_k w_k p_k is the way from the point of
-/// the second to that of the first. Weights of the first are positive and sum to one, those of the second to minus one.
+/// the second to that of the first. Weights of the first are not negative and sum to one, those of the second to minus one.
 struct ClosestPoints {
   std::array<Real, 4> weights;
   Vector3 difference;  // [m]
