@@ -16,7 +16,7 @@ Key key_of(const FeaturePair& q) { return {q.are_edges, q.from_b, q.points[0], q
 std::set<Key> all_that_may_touch(const SurfacePair& pair, Real h) {
   std::set<Key> found;
   const auto add = [&](FeaturePair q) {
-    Real thickness = pair.thickness();
+    Real thickness = pair.kept_distance();
     if (pair.is_self()) {
       const auto at = [&](int k) { return pair.a().rest_position(q.points[k]); };
       const Real rest = (q.are_edges ? closest_points_of_edges(at(0), at(1), at(2), at(3))
@@ -35,7 +35,7 @@ std::set<Key> all_that_may_touch(const SurfacePair& pair, Real h) {
   for (const bool from_b : {false, true}) {
     if (from_b && pair.is_self()) continue;
     const ContactSurface &one = from_b ? pair.b() : pair.a(), &two = from_b ? pair.a() : pair.b();
-    for (int i = 0; i < static_cast<int>(one.points().size()); ++i)
+    for (int i = 0; i < one.num_points(); ++i)
       for (const auto& [t0, t1, t2] : two.triangles())
         if (!pair.is_self() || (t0 != i && t1 != i && t2 != i))
           add({.points = {i, t0, t1, t2}, .are_edges = false, .from_b = from_b});
@@ -135,6 +135,50 @@ TEST(SurfacePair, OfASurfaceWithItselfLeavesNothingOut) {
     }
   }
   EXPECT_GT(seen, 1000u);
+}
+
+TEST(SurfacePair, WithARigidBodyThatTurnsLeavesNothingOut) {
+  Drifting s{make_sphere(0.5, 6), make_sheet(1, 1, 1, 1)};
+  std::vector<Vector3> points;
+  std::vector<Edge> edges;
+  for (int k = 0; k < 20; ++k) {  // a star of needles
+    points.push_back(Vector3::Zero());
+    points.emplace_back(Vector3(std::cos(k), std::sin(2 * k), std::cos(3 * k)).normalized());
+    edges.push_back({2 * k, 2 * k + 1});
+  }
+  ContactSurface star(points, edges, 0.04);
+  s.a.margin = star.margin = 0.05;
+  SurfacePair pair(s.a, star);
+  Random random(7);
+  Vector3 origin(1.7, 0, 0);
+  Matrix3 rotation = Matrix3::Identity();
+  std::size_t seen = 0, most = 0;
+  constexpr Real h = 0.002;
+  for (int step = 0; step < 40; ++step) {
+    s.a.begin_step(s.xa);
+    star.begin_step(origin, rotation);
+    pair.begin_step();
+    for (int substep = 0; substep < 10; ++substep) {
+      const Vector3 velocity(-std::cos(0.1 * step) * 2, 0, 0), spin = Vector3(3, 5, -2) + random.vector(3);
+      for (int i = 0; i < s.va.cols(); ++i) s.va.col(i).head<3>() = random.vector(0.5);
+      s.a.take_velocities(s.va);
+      star.take_velocities(velocity, spin);
+      pair.refresh(h, h * (10 - substep));
+      const std::set<Key> expected = all_that_may_touch(pair, h), found = visited(pair);
+      for (const Key& key : expected) ASSERT_TRUE(found.contains(key)) << "step " << step << ", substep " << substep;
+      seen += expected.size();
+      most = std::max(most, found.size());
+      s.a.drift(h);
+      star.drift(h);
+      s.xa += h * s.va;
+      s.a.take_positions(s.xa);
+      origin += h * velocity;
+      rotation = Eigen::AngleAxis<Real>(h * spin.norm(), spin.normalized()).toRotationMatrix() * rotation;
+      star.take_positions(origin, rotation);
+    }
+  }
+  EXPECT_GT(seen, 1000u);
+  EXPECT_LT(most, s.a.triangles().size() * points.size() / 4) << "and leaves most out that may not";
 }
 
 TEST(SurfacePair, KeepsTheMeanOfTheMarginsWithinWhatTheMeshCanCarry) {

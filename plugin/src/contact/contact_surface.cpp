@@ -16,6 +16,7 @@ namespace penalty {
 namespace {
 
 constexpr std::size_t largest_patch = 64;  // triangles, or edges of a rope, or lone points
+constexpr Real own_move = 0.05;            // share of the margin by which others may move a rigid body unnoticed
 
 PackedVectors points_of(std::span<const WeightedPoint> points, const Positions& particles) {
   PackedVectors result = PackedVectors::Zero(4, static_cast<Eigen::Index>(points.size()));
@@ -26,10 +27,10 @@ PackedVectors points_of(std::span<const WeightedPoint> points, const Positions& 
 }
 
 template <std::size_t N>
-void check(const std::vector<std::array<int, N>>& elements, std::size_t num_points, const char* element) {
+void check(const std::vector<std::array<int, N>>& elements, int num_points, const char* element) {
   for (std::size_t e = 0; e < elements.size(); ++e)
     for (const int point : elements[e])
-      if (point < 0 || static_cast<std::size_t>(point) >= num_points)
+      if (point < 0 || point >= num_points)
         throw std::invalid_argument(std::string("contact surface: ") + element + " " + std::to_string(e) + ": index " +
                                     std::to_string(point) + " is outside the " + std::to_string(num_points) +
                                     " points");
@@ -60,8 +61,24 @@ ContactSurface::ContactSurface(std::vector<WeightedPoint> points, std::vector<Tr
   for (std::size_t k = 0; k < points_.size(); ++k)
     points_[k].check(static_cast<int>(rest.cols()), "contact surface: point " + std::to_string(k));
   rest_ = points_of(points_, rest);
-  check(triangles_, points_.size(), "triangle");
-  check(edges, points_.size(), "edge");
+  connect(edges);
+  take_positions(rest);
+}
+
+ContactSurface::ContactSurface(std::span<const Vector3> points, const std::vector<Edge>& edges, Real radius)
+    : is_rigid_(true), radius_(radius) {
+  rest_ = PackedVectors::Zero(4, static_cast<Eigen::Index>(points.size()));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    rest_.col(static_cast<Eigen::Index>(k)).head<3>() = points[k];
+    reach_ = std::max(reach_, points[k].norm());
+  }
+  connect(edges);
+}
+
+// Edges of triangles, then the others.
+void ContactSurface::connect(const std::vector<Edge>& edges) {
+  check(triangles_, num_points(), "triangle");
+  check(edges, num_points(), "edge");
   edges_ = edges_of(std::span<const Triangle>(triangles_));
   has_triangle_.assign(edges_.size(), 1);
   const std::size_t num_of_triangles = edges_.size();
@@ -72,7 +89,11 @@ ContactSurface::ContactSurface(std::vector<WeightedPoint> points, std::vector<Tr
   std::sort(edges_.begin() + static_cast<std::ptrdiff_t>(num_of_triangles), edges_.end());
   edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
   has_triangle_.resize(edges_.size(), 0);
-  for (const auto& [i, j] : edges_) mean_edge_ += (rest_position(i) - rest_position(j)).norm();
+  for (const auto& [i, j] : edges_) {
+    const Real length = (rest_position(i) - rest_position(j)).norm();
+    mean_edge_ += length;
+    longest_edge_ = std::max(longest_edge_, length);
+  }
   if (!edges_.empty()) mean_edge_ /= static_cast<Real>(edges_.size());
   is_closed_ = every_edge_has_two_sides(triangles_);
   if (is_closed_ && signed_volume() < 0)
@@ -80,7 +101,6 @@ ContactSurface::ContactSurface(std::vector<WeightedPoint> points, std::vector<Tr
   positions_ = rest_;
   velocities_ = PackedVectors::Zero(4, rest_.cols());
   cut_into_patches();
-  take_positions(rest);
 }
 
 Real ContactSurface::signed_volume() const {
@@ -93,7 +113,7 @@ Real ContactSurface::signed_volume() const {
 
 // Triangles, then what no triangle has: edges, then points. Each edge and point goes with the first that has it.
 void ContactSurface::cut_into_patches() {
-  std::vector<char> has_point(points_.size(), 0);
+  std::vector<char> has_point(num_points(), 0);
   std::map<Edge, int> edge_number;
   for (std::size_t e = 0; e < edges_.size(); ++e) edge_number[edges_[e]] = static_cast<int>(e);
   std::vector<char> has_edge(edges_.size(), 0);
@@ -142,9 +162,12 @@ void ContactSurface::cut_into_patches() {
   };
   std::vector<int> all(triangles_.size());
   std::iota(all.begin(), all.end(), 0);
-  cut_all(all, triangles_.size(), [&](int t) { return center_of(triangles_[t]); }, take_triangle);
-  cut_all(left(has_edge), edges_.size(), [&](int e) { return center_of(edges_[e]); }, take_edge);
-  cut_all(left(has_point), points_.size(), [&](int i) { return rest_position(i); }, take_point);
+  cut_all(
+      all, triangles_.size(), [&](int t) { return center_of(triangles_[t]); }, take_triangle);
+  cut_all(
+      left(has_edge), edges_.size(), [&](int e) { return center_of(edges_[e]); }, take_edge);
+  cut_all(
+      left(has_point), num_points(), [&](int i) { return rest_position(i); }, take_point);
 
   for (SurfacePatch& patch : patches_) {
     std::sort(patch.all_points.begin(), patch.all_points.end());
@@ -190,6 +213,43 @@ void ContactSurface::begin_step(const PackedVectors& positions) {
 void ContactSurface::take_velocities(const PackedVectors& velocities) {
   for (std::size_t k = 0; k < points_.size(); ++k)
     velocities_.col(static_cast<Eigen::Index>(k)).head<3>() = points_[k].of(velocities);
+  measure_patches();
+}
+
+void ContactSurface::begin_step(const Vector3& origin, const Matrix3& rotation) {
+  if (origin == origin_ && rotation == rotation_) return;
+  const Real moved = (origin - origin_).norm() + reach_ * (rotation - rotation_).norm();
+  if (moved <= own_move * margin)
+    for (SurfacePatch& patch : patches_) patch.path += moved;
+  else
+    forget();
+  take_positions(origin, rotation);
+}
+
+void ContactSurface::take_positions(const Vector3& origin, const Matrix3& rotation) {
+  if (origin == origin_ && rotation == rotation_) return;
+  origin_ = origin;
+  rotation_ = rotation;
+  positions_.topRows<3>() = (rotation * rest_.topRows<3>()).colwise() + origin;
+  ++instant_;
+}
+
+void ContactSurface::take_velocities(const Vector3& velocity, const Vector3& angular_velocity) {
+  const bool same_spin = angular_velocity.isZero(0) && angular_velocity_.isZero(0);
+  if (velocity == velocity_ && same_spin) return;
+  velocity_ = velocity;
+  angular_velocity_ = angular_velocity;
+  for (Eigen::Index k = 0; k < positions_.cols(); ++k)
+    velocities_.col(k).head<3>() = velocity + angular_velocity.cross(position(static_cast<int>(k)) - origin_);
+  measure_patches();
+}
+
+Real ContactSurface::bend(Real duration) const {
+  const Real angle = duration * angular_velocity_.norm();
+  return reach_ * angle * angle / 2;
+}
+
+void ContactSurface::measure_patches() {
   for (SurfacePatch& patch : patches_) {
     Vector3 sum = Vector3::Zero();
     for (const int point : patch.all_points) sum += velocity(point);

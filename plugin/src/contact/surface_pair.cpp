@@ -18,7 +18,7 @@ enum Mark : char { is_pierced = 1, is_enclosed = 2 };  // of points
 
 Real mean_edge_of_finer(const ContactSurface& a, const ContactSurface& b) {
   if (a.edges().empty()) return b.mean_edge();
-  return b.edges().empty() ? a.mean_edge() : std::min(a.mean_edge(), b.mean_edge());
+  return b.edges().empty() || b.is_rigid() ? a.mean_edge() : std::min(a.mean_edge(), b.mean_edge());
 }
 
 Real volume(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
@@ -118,8 +118,9 @@ void SurfacePair::forget() {
 }
 
 void SurfacePair::begin_step() {
-  Real thickness = (a_->margin + b_->margin) / 2;
-  if (edge_ > 0) thickness = std::clamp(thickness, smallest_thickness * edge_, largest_thickness * edge_);
+  Real thickness = b_->is_rigid() ? a_->margin : (a_->margin + b_->margin) / 2;
+  if (edge_ > 0 && !b_->is_rigid()) thickness = std::min(thickness, largest_thickness * edge_);
+  thickness = std::max(thickness, smallest_thickness * edge_);
   const bool moved = epoch_a_ != a_->epoch() || epoch_b_ != b_->epoch() || thickness != thickness_;
   thickness_ = thickness;
   epoch_a_ = a_->epoch();
@@ -165,7 +166,7 @@ void SurfacePair::mark_pierced(ContactSurface& edges, ContactSurface& triangles,
 // Only points in the other's box are asked.
 void SurfacePair::mark_enclosed(const ContactSurface& points, ContactSurface& closed, std::vector<char>& marks) {
   Box box;
-  for (int k = 0; k < static_cast<int>(closed.points().size()); ++k) box.add(closed.position(k));
+  for (int k = 0; k < closed.num_points(); ++k) box.add(closed.position(k));
   for (const SurfacePatch& patch : points.patches())
     for (const int point : patch.points) {
       const Vector3 x = points.position(point);
@@ -180,12 +181,12 @@ void SurfacePair::mark_enclosed(const ContactSurface& points, ContactSurface& cl
 void SurfacePair::untangle() {
   is_tangled_ = false;
   enclosed_.clear();
-  tangled_a_.assign(a_->points().size(), 0);
+  tangled_a_.assign(a_->num_points(), 0);
   if (is_self()) {
     mark_pierced(*a_, *a_, tangled_a_, tangled_a_);
     return;
   }
-  tangled_b_.assign(b_->points().size(), 0);
+  tangled_b_.assign(b_->num_points(), 0);
   mark_pierced(*a_, *b_, tangled_a_, tangled_b_);
   mark_pierced(*b_, *a_, tangled_b_, tangled_a_);
   if (!is_tangled_) return;
@@ -205,13 +206,13 @@ bool SurfacePair::may_pass(const FeaturePair& q) const {
 }
 
 Real SurfacePair::closing_speed(Real duration) {
-  find_couples(thickness_ + duration * largest_relative_speed(), thickness_);
+  find_couples(kept_distance() + duration * largest_relative_speed(), thickness_);
   Real largest = 0;
   for (const Couple& c : couples_) {
     // Patches that are neighbours at rest always move a little against each other.
     if (is_self() && c.near.empty() && patch_a(c).rest_box.overlaps(patch_b(c).rest_box, 0)) continue;
     const Real speed = relative_speed(c);
-    if (speed > largest && a_->box_of_patch(c.a).gap_to(b_->box_of_patch(c.b)) <= speed * duration + thickness_)
+    if (speed > largest && a_->box_of_patch(c.a).gap_to(b_->box_of_patch(c.b)) <= speed * duration + kept_distance())
       largest = speed;
   }
   return largest;
@@ -219,7 +220,7 @@ Real SurfacePair::closing_speed(Real duration) {
 
 bool SurfacePair::refresh(Real h, Real remaining) {
   const Real speed = largest_relative_speed();
-  find_couples(thickness_ + refresh_ahead * h * speed, std::max(thickness_, speed * remaining));
+  find_couples(kept_distance() + refresh_ahead * h * speed, std::max(thickness_, speed * remaining));
   bool changed = false;
   has_near_ = false;
   for (Couple& c : couples_) {
@@ -236,7 +237,7 @@ bool SurfacePair::refresh(Real h, Real remaining) {
 
 void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
   c.room = std::max(least_room * thickness_, room_ahead * need);
-  const Real want = thickness_ + c.room;
+  const Real want = kept_distance() + c.room;
   Real used = c.is_searched ? used_since(c, c.searched_path, c.searched_shift) : 0;
   if (!c.is_searched || used + want > c.reach) {
     search(c, want, ahead);
@@ -309,14 +310,15 @@ void SurfacePair::search_edges(Couple& c) {
       if (is_self() && (p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1])) return;
       add(c, {.points = {p[0], p[1], q[0], q[1]},
               .are_edges = true,
-              .is_lone = !a_->has_triangle(from.edges[i]) || !b_->has_triangle(with.edges[k])});
+              // The corners of a rigid body meet triangles, and points its edges by other means.
+              .is_lone = !a_->has_triangle(from.edges[i]) || (!b_->is_rigid() && !b_->has_triangle(with.edges[k]))});
     });
   }
 }
 
 void SurfacePair::add(Couple& c, FeaturePair q) const {
   if (may_pass(q)) return;
-  q.thickness = thickness_;
+  q.thickness = kept_distance();
   q.is_measured = !is_self();
   q.at_search = closest(q).difference.norm();
   if (q.at_search <= c.reach) c.candidates.push_back(q);

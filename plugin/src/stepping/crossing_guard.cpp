@@ -1,5 +1,6 @@
 // The part of SurfaceContacts that lets nothing cross.
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -75,18 +76,23 @@ bool SurfaceContacts::is_safe(const SurfaceContact& contact, const FeaturePair& 
   const Vector3 before = closest();
   const Real distance = before.norm();
   if (contact.pair->has_no_direction(q, distance)) return true;
+  const Real bend = one.bend(h) + two.bend(h);
   Real relative2 = 0;
   for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
-  const Real kept =
-      std::min(distance, std::max(kept_share * std::min(distance, q.thickness), 2 * contact.pair->least_distance(q)));
+  const Real radius = contact.pair->b().radius();
+  const Real kept = std::min(
+      distance, std::max(radius + kept_share * std::min(std::max<Real>(distance - radius, 0), q.thickness - radius),
+                         2 * contact.pair->least_distance(q)));
   if (2 * h * std::sqrt(relative2) < distance - kept) return true;
   const std::array<Vector3, 4> start = x;
   for (int k = 0; k < 4; ++k) x[k] += h * v[k];
-  if (separation(before / distance, start, q.are_edges) > 0 && separation(before / distance, x, q.are_edges) >= kept)
+  if (separation(before / distance, start, q.are_edges) > 0 &&
+      separation(before / distance, x, q.are_edges) >= kept + bend)
     return true;
   const Vector3 after = closest();
   const Real distance_after = after.norm();
-  return distance_after >= kept && distance_after > 0 && separation(after / distance_after, start, q.are_edges) > 0;
+  return distance_after >= kept + bend && distance_after > 0 &&
+         separation(after / distance_after, start, q.are_edges) > 0;
 }
 
 template <class Visit>
@@ -96,6 +102,10 @@ void SurfaceContacts::visit_particles(const FailingPair& pair, const Visit& visi
   const int size_of_first = q.are_edges ? 2 : 1;
   for (int k = 0; k < 4; ++k) {
     const bool is_of_b = (k < size_of_first) == q.from_b;
+    if (is_of_b && contact.rigid >= 0) {
+      visit(first_particle_.back() + contact.rigid);
+      continue;
+    }
     const WeightedPoint& point = (is_of_b ? contact.pair->b() : contact.pair->a()).points()[q.points[k]];
     for (int i = 0; i < point.size; ++i)
       visit(first_particle_[is_of_b ? contact.body_b : contact.body_a] + point.particles[i]);
@@ -127,19 +137,19 @@ std::pair<SteppedBody*, int> SurfaceContacts::particle(int number) const {
 // Joins the particles of failing pairs into zones and makes these rigid, until no pair at their particles fails. The map
 // of a rigid zone, x + h (V + w x (x - c)), lets nothing inside it collapse: its singular values are at least one.
 void SurfaceContacts::freeze(Real h) {
-  const int num_particles = first_particle_.back();
+  const int count = first_particle_.back() + static_cast<int>(island_.rigid_bodies.size());
   if (zone_.empty()) {
-    zone_.resize(num_particles);
+    zone_.resize(count);
     std::iota(zone_.begin(), zone_.end(), 0);
   }
-  std::vector<std::vector<FailingPair>> pairs_of(num_particles);
+  std::vector<std::vector<FailingPair>> pairs_of(count);
   for (const SurfaceContact& contact : island_.surfaces)
     contact.pair->visit_near([&](const FeaturePair& q, Real) {
       const FailingPair pair{&contact, &q};
       visit_particles(pair, [&](int particle) { pairs_of[particle].push_back(pair); });
     });
-  std::vector<std::vector<int>> members(num_particles);
-  for (int i = 0; i < num_particles; ++i) members[zone_of(i)].push_back(i);
+  std::vector<std::vector<int>> members(count);
+  for (int i = 0; i < count; ++i) members[zone_of(i)].push_back(i);
 
   std::vector<FailingPair>& failing = scratch_.failing;
   while (!failing.empty()) {
@@ -177,50 +187,77 @@ void SurfaceContacts::freeze(Real h) {
   }
 }
 
-// What is held holds the rest.
-void SurfaceContacts::make_rigid(std::span<const int> particles) {
-  const auto position = [this](int number) {
-    const auto [body, i] = particle(number);
-    return Vector3(body->particles.positions.col(i).head<3>());
-  };
-  const auto velocity = [this](int number) {
-    const auto [body, i] = particle(number);
-    return Eigen::Map<Vector3>(body->particles.velocities.data() + 4 * i);
-  };
-  const auto inverse_mass = [this](int number) {
-    const auto [body, i] = particle(number);
-    return body->particles.inverse_masses[i];
-  };
-  for (const int held : particles)
-    if (!(inverse_mass(held) > 0)) {
-      const Vector3 v = velocity(held);
-      Real gain = 0;
-      for (const int i : particles) {
-        if (!(inverse_mass(i) > 0)) continue;
-        gain += (v.squaredNorm() - velocity(i).squaredNorm()) / 2 / inverse_mass(i);
-        velocity(i) = v;
-      }
-      outside_work_ += std::max<Real>(gain, 0);
-      return;
+struct SurfaceContacts::RigidMotion {
+  Vector3 center, velocity, turn;
+
+  Vector3 at(const Vector3& x) const { return velocity + turn.cross(x - center); }
+};
+
+// Null if the number is that of a particle.
+RigidBody* SurfaceContacts::rigid_body(int number) const {
+  const int first = first_particle_.back();
+  return number < first ? nullptr : &island_.rigid_bodies[number - first];
+}
+
+// What is held holds the rest, and does the work.
+void SurfaceContacts::make_rigid(std::span<const int> numbers) {
+  if (const auto held = motion_of_held(numbers))
+    outside_work_ += std::max<Real>(impose(*held, numbers), 0);
+  else
+    impose(common_motion(numbers), numbers);
+}
+
+// Particles without mobility, and rigid bodies that cannot move freely.
+std::optional<SurfaceContacts::RigidMotion> SurfaceContacts::motion_of_held(std::span<const int> numbers) const {
+  for (const int number : numbers) {
+    if (const RigidBody* rigid = rigid_body(number)) {
+      if (!rigid->is_free()) return RigidMotion{rigid->position, rigid->velocity, rigid->angular_velocity};
+      continue;
     }
-  const Vector3 origin = position(particles.front());
+    const auto [body, i] = particle(number);
+    if (!(body->particles.inverse_masses[i] > 0))
+      return RigidMotion{body->particles.positions.col(i).head<3>(), body->particles.velocities.col(i).head<3>(),
+                         Vector3::Zero()};
+  }
+  return std::nullopt;
+}
+
+// That keeps both momenta.
+SurfaceContacts::RigidMotion SurfaceContacts::common_motion(std::span<const int> numbers) const {
+  struct Part {
+    Real mass;
+    Vector3 position, velocity;
+  };
+  const auto part_of = [this](int number) -> Part {
+    if (const RigidBody* rigid = rigid_body(number))
+      return {1 / rigid->inverse_mass.x(), rigid->position, rigid->velocity};
+    const auto [body, i] = particle(number);
+    return {1 / body->particles.inverse_masses[i], body->particles.positions.col(i).head<3>(),
+            body->particles.velocities.col(i).head<3>()};
+  };
+  const Vector3 origin = part_of(numbers.front()).position;
   Real mass = 0;
   Vector3 center = Vector3::Zero(), mean = Vector3::Zero();
-  for (const int i : particles) {
-    const Real m = 1 / inverse_mass(i);
-    mass += m;
-    center += m * (position(i) - origin);
-    mean += m * velocity(i);
+  for (const int number : numbers) {
+    const Part part = part_of(number);
+    mass += part.mass;
+    center += part.mass * (part.position - origin);
+    mean += part.mass * part.velocity;
   }
   center = origin + center / mass;
   mean /= mass;
   Vector3 spin = Vector3::Zero();
   Matrix3 inertia = Matrix3::Zero();
-  for (const int i : particles) {
-    const Real m = 1 / inverse_mass(i);
-    const Vector3 arm = position(i) - center;
-    spin += m * arm.cross(velocity(i) - mean);
-    inertia += m * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+  for (const int number : numbers) {
+    const Part part = part_of(number);
+    const Vector3 arm = part.position - center;
+    spin += part.mass * arm.cross(part.velocity - mean);
+    inertia += part.mass * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
+    if (const RigidBody* rigid = rigid_body(number)) {
+      const Matrix3 own = rigid->inverse_inertia.inverse();
+      spin += own * rigid->angular_velocity;
+      inertia += own;
+    }
   }
   // Particles in a line have no moment about it, and nearly none is taken for none: what then turns would gain energy.
   const Eigen::SelfAdjointEigenSolver<Matrix3> axes(inertia);
@@ -230,7 +267,29 @@ void SurfaceContacts::make_rigid(std::span<const int> particles) {
     if (axes.eigenvalues()[k] > no_moment * axes.eigenvalues()[2])
       turn += axis.dot(spin) / axes.eigenvalues()[k] * axis;
   }
-  for (const int i : particles) velocity(i) = mean + turn.cross(position(i) - center);
+  return {center, mean, turn};
+}
+
+// Returns what that adds to the kinetic energy [J].
+Real SurfaceContacts::impose(const RigidMotion& motion, std::span<const int> numbers) {
+  Real gain = 0;
+  for (const int number : numbers) {
+    if (RigidBody* rigid = rigid_body(number)) {
+      if (!rigid->is_free()) continue;
+      gain -= kinetic_energy(*rigid);
+      rigid->set_motion(motion.at(rigid->position), motion.turn);
+      gain += kinetic_energy(*rigid);
+      continue;
+    }
+    const auto [body, i] = particle(number);
+    const Real inverse_mass = body->particles.inverse_masses[i];
+    if (!(inverse_mass > 0)) continue;
+    Eigen::Map<Vector3> v(body->particles.velocities.data() + 4 * i);
+    const Vector3 wanted = motion.at(body->particles.positions.col(i).head<3>());
+    gain += (wanted.squaredNorm() - v.squaredNorm()) / 2 / inverse_mass;
+    v = wanted;
+  }
+  return gain;
 }
 
 }  // namespace penalty

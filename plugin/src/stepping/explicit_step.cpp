@@ -94,12 +94,12 @@ class SubCycle {
       else
         solve_contacts(h, [&] { surfaces_.sweep(h, remaining_, [this, h] { sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
-      surfaces_.drifted(h);
     } else {
       for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
     }
-    remaining_ -= h;
     for (RigidBody& body : island_.rigid_bodies) body.drift(h);
+    surfaces_.drifted(h);
+    remaining_ -= h;
     add_driving_work(h / 2);
     for (SteppedBody* body : island_.bodies) evaluate_forces(*body);
     for (Coupling* coupling : island_.couplings) evaluate_forces(*coupling, island_);
@@ -285,8 +285,9 @@ void advance_explicitly(Island& island, Real duration) {
   Real noise = 0, tolerance = std::numeric_limits<Real>::infinity();
   int most_substeps = 1;
   // Pressed flat between others, a body would be unfolded through them.
-  const bool may_unfold = std::all_of(island.surfaces.begin(), island.surfaces.end(),
-                                      [](const SurfaceContact& contact) { return contact.body_a == contact.body_b; });
+  const bool may_unfold =
+      std::all_of(island.surfaces.begin(), island.surfaces.end(),
+                  [](const SurfaceContact& contact) { return contact.is_within_body() || contact.rigid >= 0; });
   for (SteppedBody* body : island.bodies) {
     begin_step(*body, may_unfold);
     noise += body->energy_noise;

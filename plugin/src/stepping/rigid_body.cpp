@@ -1,8 +1,22 @@
 #include "penalty/stepping/rigid_body.h"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 namespace penalty {
+
+bool RigidBody::is_free() const {
+  constexpr Real singular = 1e-12;
+  const Real trace = inverse_inertia.trace();
+  return (inverse_mass.array() > 0).all() && inverse_inertia.determinant() > singular * trace * trace * trace;
+}
+
+void RigidBody::set_motion(const Vector3& new_velocity, const Vector3& new_angular_velocity) {
+  impulse += (new_velocity - velocity).cwiseQuotient(inverse_mass);
+  angular_impulse += inverse_inertia.inverse() * (new_angular_velocity - angular_velocity);
+  velocity = new_velocity;
+  angular_velocity = new_angular_velocity;
+}
 
 void RigidBody::drift(Real duration) {
   position += duration * velocity;

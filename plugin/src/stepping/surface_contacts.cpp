@@ -37,7 +37,13 @@ SurfaceContacts::SurfaceContacts(Island& island)
   lost_thickness_.assign(island.bodies.size(), 0);
   for (const SurfaceContact& contact : island.surfaces) {
     surfaces_[contact.body_a] = &contact.pair->a();
-    surfaces_[contact.body_b] = &contact.pair->b();
+    if (contact.rigid < 0) {
+      surfaces_[contact.body_b] = &contact.pair->b();
+      continue;
+    }
+    const std::pair surface(&contact.pair->b(), &island.rigid_bodies[contact.rigid]);
+    if (std::find(rigid_surfaces_.begin(), rigid_surfaces_.end(), surface) == rigid_surfaces_.end())
+      rigid_surfaces_.push_back(surface);
   }
   first_particle_.push_back(0);
   for (const SteppedBody* body : island.bodies)
@@ -47,17 +53,20 @@ SurfaceContacts::SurfaceContacts(Island& island)
 void SurfaceContacts::take_positions() {
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     if (surfaces_[k]) surfaces_[k]->take_positions(island_.bodies[k]->particles.positions);
+  for (const auto& [surface, body] : rigid_surfaces_) surface->take_positions(body->position, body->rotation);
 }
 
 void SurfaceContacts::take_velocities() {
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     if (surfaces_[k]) surfaces_[k]->take_velocities(island_.bodies[k]->particles.velocities);
+  for (const auto& [surface, body] : rigid_surfaces_) surface->take_velocities(body->velocity, body->angular_velocity);
 }
 
 void SurfaceContacts::begin_step(Real duration) {
   if (is_empty()) return;
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     if (surfaces_[k]) surfaces_[k]->begin_step(island_.bodies[k]->particles.positions);
+  for (const auto& [surface, body] : rigid_surfaces_) surface->begin_step(body->position, body->rotation);
   take_velocities();
   Real needed = 1;
   for (const SurfaceContact& contact : island_.surfaces) {
@@ -68,7 +77,8 @@ void SurfaceContacts::begin_step(Real duration) {
     const Real closing = duration * pair.closing_speed(duration);
     // Patches of one body lie side by side, and always move a little.
     if (pair.has_near() || (!pair.is_self() && closing > 0))
-      for (const int body : {contact.body_a, contact.body_b}) may_touch_[body] = true;
+      for (const int body : {contact.body_a, contact.body_b})
+        if (body >= 0) may_touch_[body] = true;
     if (closing > 0 && pair.thickness() > 0)
       needed = std::max(needed, std::min<Real>(std::ceil(closing / (step_share * pair.thickness())), most_substeps));
   }
@@ -99,6 +109,7 @@ void SurfaceContacts::close(Real h, const std::function<void()>& rigid_sweep) {
 void SurfaceContacts::drifted(Real h) {
   for (ContactSurface* surface : surfaces_)
     if (surface) surface->drift(h);
+  for (const auto& [surface, body] : rigid_surfaces_) surface->drift(h);
   take_positions();
 }
 
@@ -107,6 +118,7 @@ void SurfaceContacts::undo() {
   std::fill(lost_thickness_.begin(), lost_thickness_.end(), 0);
   for (ContactSurface* surface : surfaces_)
     if (surface) surface->forget();
+  for (const auto& [surface, body] : rigid_surfaces_) surface->forget();
   take_positions();
   for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
 }
@@ -131,11 +143,11 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
   const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
   TouchingPair pair{.begin = scratch_.particles.size(),
                     .difference = closest.difference,
-                    .thickness = q.thickness,
+                    .thickness = q.thickness - surfaces.b().radius(),
                     .friction = surfaces.friction(),
                     .leads_out = leads_out != nullptr,
                     .body_a = contact.body_a,
-                    .body_b = contact.body_b};
+                    .body_b = contact.rigid < 0 ? contact.body_b : contact.body_a};
   const Real distance = closest.difference.norm();
   pair.gap = (leads_out ? -distance : distance) - q.thickness;
   if (leads_out) {
@@ -151,14 +163,25 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
   const int of_first = q.from_b ? contact.body_b : contact.body_a,
             of_second = q.from_b ? contact.body_a : contact.body_b;
   const int size_of_first = q.are_edges ? 2 : 1;
-  for (int k = 0; k < 4; ++k)
-    add_particles((k < size_of_first ? one : two).points()[q.points[k]], closest.weights[k],
-                  k < size_of_first ? of_first : of_second, pair.begin);
+  Vector3 at = Vector3::Zero();
+  for (int k = 0; k < 4; ++k) {
+    const bool is_of_first = k < size_of_first;
+    const ContactSurface& surface = is_of_first ? one : two;
+    if (surface.is_rigid()) continue;
+    add_particles(surface.points()[q.points[k]], closest.weights[k], is_of_first ? of_first : of_second, pair.begin);
+    at += std::abs(closest.weights[k]) * surface.position(q.points[k]);
+  }
   pair.end = scratch_.particles.size();
-  pair.mobility = 0;
   for (std::size_t k = pair.begin; k < pair.end; ++k) {
     const TouchingParticle& p = scratch_.particles[k];
-    pair.mobility += p.weight * p.weight * p.inverse_mass;
+    pair.soft_mobility += p.weight * p.weight * p.inverse_mass;
+  }
+  pair.mobility = pair.soft_mobility;
+  if (contact.rigid >= 0) {
+    pair.rigid = &island_.rigid_bodies[contact.rigid];
+    pair.rigid_weight = one.is_rigid() ? 1 : -1;
+    pair.arm = at - pair.rigid->position;
+    pair.mobility += pair.rigid->mobility_at(pair.arm, pair.normal);
   }
   if (!(pair.mobility > 0)) {
     scratch_.particles.resize(pair.begin);
@@ -244,6 +267,7 @@ Vector3 SurfaceContacts::relative_velocity(const TouchingPair& pair) const {
   Vector3 sum = Vector3::Zero();
   for (std::size_t k = pair.begin; k < pair.end; ++k)
     sum += scratch_.particles[k].weight * vector(scratch_.particles[k].velocity);
+  if (pair.rigid) sum += pair.rigid_weight * pair.rigid->velocity_at(pair.arm);
   return sum;
 }
 
@@ -281,8 +305,8 @@ Vector3 SurfaceContacts::spin_of(const TouchingPair& pair, const Vector3& turn) 
   return spin;
 }
 
-// Without the rotation `turn` that a unit impulse would give. Whoever drives particles that are held does the work of
-// what they give.
+// Without the rotation `turn` that a unit impulse would give. Whoever drives what is held does the work of what it
+// gives.
 void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn) {
   for (std::size_t k = pair.begin; k < pair.end; ++k) {
     const TouchingParticle& p = scratch_.particles[k];
@@ -292,6 +316,12 @@ void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3
     else
       outside_work_ -= p.weight * impulse * direction.dot(vector(p.velocity));
   }
+  if (!pair.rigid) return;
+  const Vector3 given = pair.rigid_weight * impulse * direction;
+  if (pair.rigid->is_dynamic())
+    pair.rigid->push(given, pair.arm);
+  else
+    outside_work_ -= given.dot(pair.rigid->velocity_at(pair.arm));
 }
 
 // Returns the largest change of a distance in the drift, relative to its thickness.
@@ -299,7 +329,7 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
   Real worst = 0;
   for (TouchingPair& pair : scratch_.pairs) {
     const Vector3 velocity = relative_velocity(pair);
-    const Vector3 turn = pair.leads_out ? turn_of(pair, pair.normal) : Vector3(Vector3::Zero());
+    const Vector3 turn = pair.leads_out && !pair.rigid ? turn_of(pair, pair.normal) : Vector3(Vector3::Zero());
     const Real speed = pair.normal.dot(velocity) - turn.dot(spin_of(pair, turn));
     Real wanted = -pair.gap / h;
     if (wanted > 0)
@@ -350,21 +380,31 @@ void SurfaceContacts::find_inertia(TouchingPair& pair) const {
   if (pair.can_turn) pair.inverse_inertia = inertia.inverse();
 }
 
-// A pinned particle takes up any moment; particles in one line have none about it to speak of, and no friction.
+// A pinned particle and a rigid body take up any moment; particles in one line have none about it to speak of, and no
+// friction.
 void SurfaceContacts::rub(TouchingPair& pair, Real normal_impulse, Vector3 slip) {
-  if (!pair.has_inertia) find_inertia(pair);
-  constexpr Real no_slip = 1e-12;
-  if (pair.can_turn) {
-    const Vector3 spin = spin_of(pair, pair.normal);
-    slip -= (pair.inverse_inertia * spin).cross(pair.difference);
-    slip -= pair.normal.dot(slip) * pair.normal;
-  } else if (!pair.is_held) {
-    return;
+  Vector3 turn = Vector3::Zero();
+  if (!pair.rigid) {
+    if (!pair.has_inertia) find_inertia(pair);
+    if (pair.can_turn) {
+      const Vector3 spin = spin_of(pair, pair.normal);
+      slip -= (pair.inverse_inertia * spin).cross(pair.difference);
+      slip -= pair.normal.dot(slip) * pair.normal;
+    } else if (!pair.is_held) {
+      return;
+    }
   }
+  constexpr Real no_slip = 1e-12;
   const Real slip_speed = slip.norm();
   if (!(slip_speed > no_slip)) return;
-  const Vector3 direction = slip / slip_speed, turn = turn_of(pair, direction);
-  const Real mobility = pair.mobility - pair.difference.cross(direction).dot(turn);
+  const Vector3 direction = slip / slip_speed;
+  Real mobility = pair.soft_mobility;
+  if (pair.rigid) {
+    mobility += pair.rigid->mobility_at(pair.arm, direction);
+  } else {
+    turn = turn_of(pair, direction);
+    mobility -= pair.difference.cross(direction).dot(turn);
+  }
   if (!(mobility > least_mobility * pair.mobility)) return;
   const Real impulse = std::min(pair.friction * normal_impulse, slip_speed / mobility);
   push(pair, -impulse, direction, turn);

@@ -1,6 +1,7 @@
 // Contacts between surfaces of soft bodies, through the substeps of one step.
 #pragma once
 #include <functional>
+#include <optional>
 
 #include "penalty/contact/surface_pair.h"
 #include "penalty/stepping/island.h"
@@ -13,11 +14,15 @@ struct TouchingPair {
   Vector3 normal = Vector3::Zero();      // from the point of the second feature to that of the first
   Vector3 difference = Vector3::Zero();  // the way between these points [m]
   Real gap = 0, thickness = 0;           // distance beyond the thickness; negative where some of that is lost [m]
-  Real mobility = 0;                     // of an impulse along the normal [1/kg]
+  Real mobility = 0;                     // of an impulse along the normal [1/kg],
+  Real soft_mobility = 0;                // and of the particles alone
   Real friction = 0;
-  Real given = 0;              // to lead it out, so far in this substep [N s]
-  bool leads_out = false;      // out of a closed surface that the first feature, a point, is inside of
-  int body_a = 0, body_b = 0;  // half of what is lost is booked to each
+  Real given = 0;                 // to lead it out, so far in this substep [N s]
+  bool leads_out = false;         // out of a closed surface that the first feature, a point, is inside of
+  int body_a = 0, body_b = 0;     // half of what is lost is booked to each
+  RigidBody* rigid = nullptr;     // one of the features is fixed in it, and takes
+  Real rigid_weight = 0;          // so much of an impulse: 1 the first, -1 the second,
+  Vector3 arm = Vector3::Zero();  // where the other one is, from its centre [m]
 
   // What friction needs, found when it is needed first: see SurfaceContacts::rub.
   bool has_inertia = false, is_held = false, can_turn = false;
@@ -53,7 +58,8 @@ struct SurfaceScratch {
 ///
 /// Friction acts at two points that are a thickness apart, so it would turn the particles of the pair: the part of
 /// the slip that is a rotation of these is left out, and so is the rotation that the impulse would give. Both momenta are
-/// kept to round-off, but where features lie on each other, see SurfacePair::has_no_direction.
+/// kept to round-off, but where features lie on each other, see SurfacePair::has_no_direction. A rigid body takes
+/// impulses at the point of the soft one, so there is nothing to leave out.
 ///
 /// Sweeps go on until they change nothing that matters, contacts with rigid bodies in each of them and once more at
 /// the end. Then the guard lets no pair drift unless a plane separates it before and after: linear motions separated at
@@ -98,6 +104,8 @@ class SurfaceContacts {
   Real outside_work() const { return outside_work_; }
 
  private:
+  struct RigidMotion;  // of particles and rigid bodies that move as one
+
   void take_positions();
   void take_velocities();
   bool refresh(Real h, Real remaining);
@@ -120,20 +128,25 @@ class SurfaceContacts {
   void find_failing(Real h);
   bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;
   void freeze(Real h);
-  void make_rigid(std::span<const int> particles);
+  void make_rigid(std::span<const int> numbers);
+  std::optional<RigidMotion> motion_of_held(std::span<const int> numbers) const;
+  RigidMotion common_motion(std::span<const int> numbers) const;
+  Real impose(const RigidMotion& motion, std::span<const int> numbers);
   template <class Visit>
   void visit_particles(const FailingPair& pair, const Visit& visit) const;
   bool is_in_one_zone(const FailingPair& pair);
   int zone_of(int particle);
   std::pair<SteppedBody*, int> particle(int number) const;
+  RigidBody* rigid_body(int number) const;
 
   Island& island_;
   SurfaceScratch& scratch_;
   std::vector<ContactSurface*> surfaces_;  // of the island's bodies, null: none
-  std::vector<int> first_particle_;        // of each body, and their number: particles numbered through
-  std::vector<int> zone_;                  // of particles that move as one: another of these; empty: none do
-  std::vector<char> may_touch_;            // each body
-  std::vector<Real> lost_thickness_;       // of each body, the most in this step [m]
+  std::vector<std::pair<ContactSurface*, RigidBody*>> rigid_surfaces_;
+  std::vector<int> first_particle_;   // of each body, and their number: particles numbered through, then rigid bodies
+  std::vector<int> zone_;             // of particles that move as one: another of these; empty: none do
+  std::vector<char> may_touch_;       // each body
+  std::vector<Real> lost_thickness_;  // of each body, the most in this step [m]
   int least_substeps_ = 1;
   long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step
   Real outside_work_ = 0;

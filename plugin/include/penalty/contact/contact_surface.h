@@ -1,4 +1,4 @@
-// What of a soft body may touch, in patches that keep account of how far they have moved.
+// What of a body may touch, in patches that keep account of how far they have moved.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -27,7 +27,8 @@ struct SurfacePatch {
 };
 
 /// Points, edges and triangles that may touch others'. A point is one of particles, or of an embedded surface: all
-/// geometry is done on the points, and impulses go to their particles.
+/// geometry is done on the points, and impulses go to their particles. Or all of them are fixed in the frame of a rigid
+/// body: its corners and edges, the centre of a ball, the axis of a capsule.
 class ContactSurface {
  public:
   /// `edges` are those of no triangle: a rope. `rest` are positions of the particles [m]. Points that stand in no edge
@@ -37,7 +38,15 @@ class ContactSurface {
   ContactSurface(std::vector<WeightedPoint> points, std::vector<Triangle> triangles, const std::vector<Edge>& edges,
                  const Positions& rest);
 
-  std::span<const WeightedPoint> points() const { return points_; }
+  /// Points in the frame of a rigid body [m] and edges between them; an edge from a point to itself is that point, for
+  /// those that meet no points. The body reaches `radius` [m] beyond each. Throws like the other.
+  ContactSurface(std::span<const Vector3> points, const std::vector<Edge>& edges, Real radius);
+
+  bool is_rigid() const { return is_rigid_; }
+  Real radius() const { return radius_; }  // [m]
+
+  int num_points() const { return static_cast<int>(rest_.cols()); }
+  std::span<const WeightedPoint> points() const { return points_; }  // none of a rigid body
   std::span<const Triangle> triangles() const { return triangles_; }
   std::span<const Edge> edges() const { return edges_; }  // all of them
   bool has_triangle(int edge) const { return has_triangle_[edge] != 0; }
@@ -45,7 +54,8 @@ class ContactSurface {
 
   /// Each edge has one triangle on either side: there is an inside, behind the triangles.
   bool is_closed() const { return is_closed_; }
-  Real mean_edge() const { return mean_edge_; }  // at rest; zero without edges [m]
+  Real mean_edge() const { return mean_edge_; }        // at rest; zero without edges [m]
+  Real longest_edge() const { return longest_edge_; }  // likewise
 
   Real margin = 0;    // distance that it keeps from itself, and from others the mean of both [m]
   Real friction = 0;  // Coulomb coefficient, to be multiplied with the other's
@@ -55,6 +65,15 @@ class ContactSurface {
   void begin_step(const PackedVectors& positions);
   void take_positions(const PackedVectors& positions);
   void take_velocities(const PackedVectors& velocities);
+
+  /// The same of a rigid body: where its frame is, and how it moves about its origin [m/s], [rad/s]. A move by others that
+  /// is small against the margin, as round-off is, counts as one of its own.
+  void begin_step(const Vector3& origin, const Matrix3& rotation);
+  void take_positions(const Vector3& origin, const Matrix3& rotation);
+  void take_velocities(const Vector3& velocity, const Vector3& angular_velocity);
+
+  /// What a point of a rigid body that moves on for `duration` [s] ends off the straight line, at most [m].
+  Real bend(Real duration) const;
 
   /// The points move on for `duration` [s] at the velocities that were taken last: accounts of the patches, no more.
   void drift(Real duration);
@@ -86,7 +105,9 @@ class ContactSurface {
   Real winding_number(const Vector3& x) const;
 
  private:
+  void connect(const std::vector<Edge>& edges);
   void cut_into_patches();
+  void measure_patches();
   Real signed_volume() const;  // at rest [m³]
 
   std::vector<WeightedPoint> points_;
@@ -94,9 +115,13 @@ class ContactSurface {
   std::vector<Edge> edges_;
   std::vector<char> has_triangle_;  // each edge
   std::vector<SurfacePatch> patches_;
-  PackedVectors rest_, positions_, velocities_;
+  PackedVectors rest_, positions_, velocities_;  // the first in the frame of a rigid body
+  bool is_rigid_ = false;
+  Real radius_ = 0, reach_ = 0;  // the latter of its points from the origin [m]
+  Vector3 origin_ = Vector3::Zero(), velocity_ = Vector3::Zero(), angular_velocity_ = Vector3::Zero();
+  Matrix3 rotation_ = Matrix3::Identity();
   bool is_closed_ = false;
-  Real mean_edge_ = 0;
+  Real mean_edge_ = 0, longest_edge_ = 0;
   std::uint64_t epoch_ = 1, instant_ = 1;  // the latter of the positions
 };
 

@@ -12,7 +12,7 @@ struct FeaturePair {
   bool from_b = false;                 // the first feature belongs to surface b, the second to a
   bool is_lone = false;                // edges of which one is of no triangle
   bool is_measured = false;            // `thickness` is final
-  Real thickness = 0;                  // distance that is kept [m]
+  Real thickness = 0;                  // distance that is kept, the radius of a rigid surface included [m]
   Real at_refresh = 0, at_search = 0;  // distance then [m]
 };
 
@@ -29,7 +29,7 @@ struct EnclosedPoint {
 /// below what a substep moves is ever left out.
 class SurfacePair {
  public:
-  /// The same surface twice: pairs within it, but for those that share a point.
+  /// The same surface twice: pairs within it, but for those that share a point. `b` may be of a rigid body, `a` not.
   SurfacePair(ContactSurface& a, ContactSurface& b);
 
   ContactSurface& a() const { return *a_; }
@@ -38,7 +38,9 @@ class SurfacePair {
   const ContactSurface& first(const FeaturePair& q) const { return q.from_b ? *b_ : *a_; }
   const ContactSurface& second(const FeaturePair& q) const { return q.from_b ? *a_ : *b_; }
 
-  Real thickness() const { return thickness_; }  // that is kept where rest shapes leave room for it [m]
+  /// That is kept, beyond the radius of a rigid surface, where rest shapes leave room for it [m].
+  Real thickness() const { return thickness_; }
+  Real kept_distance() const { return thickness_ + b_->radius(); }
   Real friction() const { return a_->friction * b_->friction; }
 
   /// Begins a step, at positions that were taken: what was known is dropped if a surface was moved by others, or margins

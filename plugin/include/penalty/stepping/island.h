@@ -72,10 +72,14 @@ struct Coupling {
   FieldState start_state;
 };
 
-/// Where the surfaces of two bodies of an island, or of one, may touch.
+/// Where the surfaces of two bodies of an island, or of one, may touch, or that of a body the corners and edges of a
+/// rigid one.
 struct SurfaceContact {
   SurfacePair* pair = nullptr;
   int body_a = -1, body_b = -1;  // whose surfaces these are; the same: one body with itself
+  int rigid = -1;                // index of the rigid body that has surface b; body_b is -1 then
+
+  bool is_within_body() const { return body_a == body_b; }
 };
 
 /// Bodies that touch the same rigid bodies, touch each other or are coupled, and all that is between them: what has to

@@ -21,6 +21,9 @@ struct RigidBody {
 
   bool is_dynamic() const { return !inverse_mass.isZero(0) || !inverse_inertia.isZero(0); }
 
+  /// It takes impulses and moments in every direction.
+  bool is_free() const;
+
   /// Of the point at `arm` from the centre of mass, along the world axes [m]: velocity [m/s].
   Vector3 velocity_at(const Vector3& arm) const { return velocity + angular_velocity.cross(arm); }
 
@@ -41,6 +44,9 @@ struct RigidBody {
     angular_impulse += moment;
     return work;
   }
+
+  /// Gives a free body these velocities [m/s], [rad/s], booked like a push.
+  void set_motion(const Vector3& new_velocity, const Vector3& new_angular_velocity);
 
   /// Moves the body for `duration` [s] at its velocities.
   void drift(Real duration);
