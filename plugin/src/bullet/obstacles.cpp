@@ -8,6 +8,7 @@
 
 #include "convert.h"
 #include "held_bodies.h"
+#include "rigid_surfaces.h"
 #include "sleeping.h"
 #include "surface_distance.h"
 #include "world_island.h"
@@ -79,7 +80,8 @@ std::vector<btCollisionObject*> obstacles_near(btSoftBody& body, const Box& box,
   return std::move(found.objects);
 }
 
-bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies, Real duration) {
+bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies,
+                     RigidSurfaces& rigid_surfaces, Real duration) {
   SteppedBody& stepped = held.stepped;
   const Particles& particles = stepped.particles;
   btSoftBody& body = *held.body;
@@ -114,6 +116,14 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     if (!std::isfinite(friction)) {
       friction = 0;
       friction_is_finite = false;
+    }
+    Box reached = box;
+    reached.low.array() -= reach;
+    reached.high.array() += reach;
+    for (SurfacePair* pair : rigid_surfaces.near(held, *object, reached)) {
+      pair->b().friction = std::isfinite(pair->b().friction) ? pair->b().friction : 0;
+      const bool approached = fastest > waking_speed && object_box.overlaps(box, 2 * margin);
+      island.surfaces.push_back({pair, &held, nullptr, rigid_bodies.touch(*object, approached, island.touched)});
     }
     const auto add_point = [&](const WeightedPoint& point) {
       const Vector3 x = point.of(particles.positions);

@@ -11,6 +11,7 @@ namespace penalty {
 
 struct HeldBody;
 class RigidBodies;
+class RigidSurfaces;
 struct WorldIsland;
 
 Box bounds_of(const btCollisionObject& object);
@@ -24,6 +25,7 @@ std::vector<btCollisionObject*> obstacles_near(btSoftBody& body, const Box& box,
 
 /// Adds to the island of one body, which is about to be stepped, its contacts and what it may touch. Returns false
 /// if the friction of an object is no number, and was left out.
-bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies, Real duration);
+bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rigid_bodies,
+                     RigidSurfaces& rigid_surfaces, Real duration);
 
 }  // namespace penalty

@@ -7,13 +7,10 @@
 #include "convert.h"
 #include "held_bodies.h"
 #include "obstacles.h"
-#include "penalty/mesh/embed.h"
 #include "world_island.h"
 
 namespace penalty {
 namespace {
-
-Real margin_of(const HeldBody& held) { return held.body->getCollisionShape()->getMargin(); }
 
 constexpr Real largest_way = 1e3;  // in a step [m]
 
@@ -49,7 +46,8 @@ Extent extent_of(const HeldBody& held, std::span<const TouchedRigidBody> touched
   if (stepped.mass > 0) fastest2 += 2 * std::max<Real>(held.stepped.elastic_energy, 0) / stepped.mass;
   Real fastest = std::sqrt(fastest2);
   for (const TouchedRigidBody& t : touched) fastest = std::max(fastest, t.start.velocity.norm());
-  extent.way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration + margin_of(held);
+  extent.way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration +
+               Real(held.body->getCollisionShape()->getMargin());
   return extent;
 }
 
@@ -63,50 +61,9 @@ Extent extent_of_nodes(const HeldBody& held, Real duration) {
     fastest2 = std::max(fastest2, Real(body.m_nodes[i].m_v.length2()));
   }
   const Real gravity = Real(body.m_worldInfo->m_gravity.length()) * std::abs(Real(body.m_gravityFactor));
-  extent.way = std::sqrt(fastest2) * duration + gravity * duration * duration + margin_of(held);
+  extent.way = std::sqrt(fastest2) * duration + gravity * duration * duration +
+               Real(held.body->getCollisionShape()->getMargin());
   return extent;
-}
-
-// Its own if it has one, faces if there are any, else links, else nodes.
-std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
-  const btSoftBody& body = *held.body;
-  const PackedVectors& rest = held.field.rest_positions();
-  if (const BodySurface& own = held.options.surface; !own.points.empty())
-    return std::make_shared<ContactSurface>(own.points, own.triangles, std::vector<Edge>{}, rest);
-  std::vector<int> point_of(body.m_nodes.size(), -1);
-  std::vector<WeightedPoint> points;
-  const auto point_at = [&](const btSoftBody::Node* node) {
-    const auto i = static_cast<int>(node - &body.m_nodes[0]);
-    if (point_of[i] < 0) {
-      point_of[i] = static_cast<int>(points.size());
-      points.push_back(WeightedPoint::at_particle(i));
-    }
-    return point_of[i];
-  };
-  std::vector<Triangle> triangles;
-  std::vector<Edge> edges;
-  for (int k = 0; k < body.m_faces.size(); ++k) {
-    const auto& n = body.m_faces[k].m_n;
-    triangles.push_back({point_at(n[0]), point_at(n[1]), point_at(n[2])});
-  }
-  if (triangles.empty())
-    for (int k = 0; k < body.m_links.size(); ++k)
-      edges.push_back({point_at(body.m_links[k].m_n[0]), point_at(body.m_links[k].m_n[1])});
-  if (triangles.empty() && edges.empty())
-    for (int i = 0; i < body.m_nodes.size(); ++i) point_at(&body.m_nodes[i]);
-  return std::make_shared<ContactSurface>(std::move(points), std::move(triangles), edges, rest);
-}
-
-// Made anew when the application has added faces or links.
-ContactSurface& surface_of(HeldBody& held) {
-  const std::array<int, 2> size{held.body->m_faces.size(), held.body->m_links.size()};
-  if (!held.surface || held.surface_size != size) {
-    held.surface = make_surface(held);
-    held.surface_size = size;
-  }
-  held.surface->margin = margin_of(held);
-  held.surface->friction = held.body->m_cfg.kDF;
-  return *held.surface;
 }
 
 bool touches_itself(HeldBody& held) {
@@ -155,16 +112,6 @@ std::vector<std::array<int, 2>> overlaps_of_struck(std::span<Extent> extents) {
 }
 
 }  // namespace
-
-BodySurface BodySurface::of(const EmbeddedSurface& embedded) {
-  BodySurface surface{.points = std::vector<WeightedPoint>(embedded.stencils.size()),
-                      .triangles = embedded.surface.triangles};
-  for (std::size_t v = 0; v < surface.points.size(); ++v) {
-    surface.points[v] = {.particles = embedded.stencils[v], .weights = {}, .size = 4};
-    for (int k = 0; k < 4; ++k) surface.points[v].weights[k] = embedded.weights(k, static_cast<Eigen::Index>(v));
-  }
-  return surface;
-}
 
 void Surfaces::wake_touched(const HeldBodies& bodies, std::span<btSoftBody* const> listed, Real duration) {
   std::vector<HeldBody*> held;

@@ -18,11 +18,15 @@ class HeldBodies;
 struct HeldBody;
 struct WorldIsland;
 
+/// The surface of the body with its margin and friction of now, made anew when the application has added faces or links.
+ContactSurface& surface_of(HeldBody& held);
+
 /// A pair of an island.
 struct HeldPair {
   SurfacePair* pair;
   HeldBody* a;
-  HeldBody* b;  // the same: the body with itself
+  HeldBody* b;       // the same: the body with itself; null: corners and edges of
+  int touched = -1;  // a rigid body, by its number in the island
 };
 
 /// Pairs of surfaces are kept from step to step while the boxes that the bodies may sweep overlap.

@@ -26,7 +26,10 @@ void WorldIsland::absorb(WorldIsland& from) {
   }
   held.insert(held.end(), from.held.begin(), from.held.end());
   couplings.insert(couplings.end(), from.couplings.begin(), from.couplings.end());
-  surfaces.insert(surfaces.end(), from.surfaces.begin(), from.surfaces.end());
+  for (HeldPair pair : from.surfaces) {
+    if (pair.touched >= 0) pair.touched = renumbered[pair.touched];
+    surfaces.push_back(pair);
+  }
   from = {};
 }
 
@@ -45,7 +48,8 @@ void WorldIsland::advance(Real duration, Island& island) {
   island.contacts = contacts;
   island.surfaces.clear();
   for (std::size_t k = 0; k < held.size(); ++k) held[k]->number = static_cast<int>(k);
-  for (const auto& [pair, a, b] : surfaces) island.surfaces.push_back({pair, a->number, b->number});
+  for (const auto& [pair, a, b, touched_by] : surfaces)
+    island.surfaces.push_back({pair, a->number, b ? b->number : -1, touched_by});
   island.couplings.clear();
   for (HeldCoupling* coupling : couplings) {
     for (std::size_t k = 0; k < coupling->points.size(); ++k) {

@@ -88,6 +88,7 @@ std::span<HeldBody* const> AttachedBodies::World::step(std::span<btSoftBody* con
   shield(
       [&] {
         rigid_bodies_.begin_step(duration, gravity_applied);
+        rigid_surfaces_.begin_step();
         step_all(listed, duration);
       },
       [&](const char* problem) {
@@ -152,7 +153,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   }
   WorldIsland island;
   island.held.push_back(&held);
-  held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, duration);
+  held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);
   wait_for_carried(body, island);
   islands_.push_back(std::move(island));
 }

@@ -1,0 +1,64 @@
+// The surface with which a soft body touches.
+#include "penalty/bullet/body_surface.h"
+
+#include "held_bodies.h"
+#include "penalty/mesh/embed.h"
+#include "surfaces.h"
+
+namespace penalty {
+namespace {
+
+// Its own if it has one, faces if there are any, else links, else nodes.
+std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
+  const btSoftBody& body = *held.body;
+  const PackedVectors& rest = held.field.rest_positions();
+  if (const BodySurface& own = held.options.surface; !own.points.empty())
+    return std::make_shared<ContactSurface>(own.points, own.triangles, std::vector<Edge>{}, rest);
+  std::vector<int> point_of(body.m_nodes.size(), -1);
+  std::vector<WeightedPoint> points;
+  const auto point_at = [&](const btSoftBody::Node* node) {
+    const auto i = static_cast<int>(node - &body.m_nodes[0]);
+    if (point_of[i] < 0) {
+      point_of[i] = static_cast<int>(points.size());
+      points.push_back(WeightedPoint::at_particle(i));
+    }
+    return point_of[i];
+  };
+  std::vector<Triangle> triangles;
+  std::vector<Edge> edges;
+  for (int k = 0; k < body.m_faces.size(); ++k) {
+    const auto& n = body.m_faces[k].m_n;
+    triangles.push_back({point_at(n[0]), point_at(n[1]), point_at(n[2])});
+  }
+  if (triangles.empty())
+    for (int k = 0; k < body.m_links.size(); ++k)
+      edges.push_back({point_at(body.m_links[k].m_n[0]), point_at(body.m_links[k].m_n[1])});
+  if (triangles.empty() && edges.empty())
+    for (int i = 0; i < body.m_nodes.size(); ++i) point_at(&body.m_nodes[i]);
+  return std::make_shared<ContactSurface>(std::move(points), std::move(triangles), edges, rest);
+}
+
+}  // namespace
+
+BodySurface BodySurface::of(const EmbeddedSurface& embedded) {
+  BodySurface surface{.points = std::vector<WeightedPoint>(embedded.stencils.size()),
+                      .triangles = embedded.surface.triangles};
+  for (std::size_t v = 0; v < surface.points.size(); ++v) {
+    surface.points[v] = {.particles = embedded.stencils[v], .weights = {}, .size = 4};
+    for (int k = 0; k < 4; ++k) surface.points[v].weights[k] = embedded.weights(k, static_cast<Eigen::Index>(v));
+  }
+  return surface;
+}
+
+ContactSurface& surface_of(HeldBody& held) {
+  const std::array<int, 2> size{held.body->m_faces.size(), held.body->m_links.size()};
+  if (!held.surface || held.surface_size != size) {
+    held.surface = make_surface(held);
+    held.surface_size = size;
+  }
+  held.surface->margin = held.body->getCollisionShape()->getMargin();
+  held.surface->friction = held.body->m_cfg.kDF;
+  return *held.surface;
+}
+
+}  // namespace penalty
