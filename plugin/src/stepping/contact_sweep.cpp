@@ -93,11 +93,9 @@ ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
     const Real normal_speed = normal.dot(relative);
 
     Real wanted = -gap / duration;
-    if (gap <= 0)
-      wanted = opposite.is_obstacle()
-                   ? std::clamp<Real>((-gap - slop) / std::max(recovery_time, duration), 0, recovery_speed)
-                   : 0;
+    if (gap <= 0) wanted = std::clamp<Real>((-gap - slop) / std::max(recovery_time, duration), 0, recovery_speed);
     if (normal_speed >= wanted) continue;
+    work.change = std::max(work.change, wanted - normal_speed);
     const Real normal_impulse = (wanted - normal_speed) / (point_mobility + opposite.mobility(normal));
     Vector3 impulse = normal_impulse * normal;
     const Vector3 slip = relative - normal_speed * normal;

@@ -23,7 +23,7 @@ Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edge
 
 }  // namespace
 
-void SurfaceContacts::guard(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
+void SurfaceContacts::guard(Real h, Real remaining, const RigidSweep& rigid_sweep) {
   zone_.clear();
   if (is_beyond_help()) return;
   bool collected = true;

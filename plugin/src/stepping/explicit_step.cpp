@@ -7,15 +7,19 @@
 #include "contact_sweep.h"
 #include "coupling.h"
 #include "energy_guard.h"
+#include "rigid_contacts.h"
 #include "stepped_body.h"
 #include "surface_contacts.h"
 
 namespace penalty {
 namespace {
 
-constexpr int most_blocks = 8;        // of substeps, after each of which there is damping and plastic flow
-constexpr Real retry_growth = 1.5;    // substeps of a repeated step
-constexpr Real substep_memory = 0.8;  // share of the last step's substeps that the next one starts from
+constexpr int most_blocks = 8;           // of substeps, after each of which there is damping and plastic flow
+constexpr Real retry_growth = 1.5;       // substeps of a repeated step
+constexpr int most_rigid_sweeps = 50;    // of a substep; they end when one changes speeds by less than
+constexpr Real rigid_tolerance = 1e-3;   // this share of the first,
+constexpr Real rigid_negligible = 0.02;  // or of what accelerations make of them
+constexpr Real substep_memory = 0.8;     // share of the last step's substeps that the next one starts from
 
 // v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
 // over the particles.
@@ -47,8 +51,8 @@ bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupl
 class SubCycle {
  public:
   SubCycle(Island& island, SurfaceContacts& surfaces, Real duration)
-      : island_(island), surfaces_(surfaces), duration_(duration) {
-    has_contacts_ = !island.contacts.empty() || !surfaces.is_empty();
+      : island_(island), surfaces_(surfaces), rigid_contacts_(island), duration_(duration) {
+    has_contacts_ = !island.contacts.empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
     for (const SteppedBody* body : island_.bodies) {
       has_blocks_ = has_blocks_ || damps(*body) || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
@@ -64,7 +68,8 @@ class SubCycle {
     const int blocks = has_blocks_ ? std::clamp(substeps / 4, 1, most_blocks) : 1;
     const int per_block = (substeps + blocks - 1) / blocks;
     const Real h = duration_ / (blocks * per_block);
-    outside_work_ = 0;
+    outside_work_ = since_contacts_ = 0;
+    rigid_contacts_.begin_attempt();
     remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) body->step_flows = {};
     for (int block = 0; block < blocks; ++block) {
@@ -75,13 +80,18 @@ class SubCycle {
       }
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
-      if (!surfaces_.is_empty()) solve_contacts(0, [&] { surfaces_.close(h, [this, h] { sweep(h); }); });
+      if (!surfaces_.is_empty())
+        solve_contacts(0, h, [&] { surfaces_.close(h, [this, h] { return sweep(h); }); });
+      else if (!rigid_contacts_.is_empty())
+        solve_contacts(0, h, [&] { converge(h); });
       if (has_blocks_) end_block(duration_ / blocks);
     }
     return blocks * per_block;
   }
 
-  Real outside_work() const { return outside_work_; }  // of obstacles, of driven particles, of taking depth back [J]
+  Real outside_work() const {
+    return outside_work_ + rigid_contacts_.outside_work();
+  }  // of obstacles, of driven particles, of taking depth back [J]
 
  private:
   void substep(Real kick_time, Real h) {
@@ -90,9 +100,9 @@ class SubCycle {
       for (SteppedBody* body : island_.bodies) kick(*body, kick_time);
       // Since the last drift there was a whole kick, be it in halves.
       if (surfaces_.is_empty())
-        solve_contacts(h, [&] { sweep(h); });
+        solve_contacts(h, h, [&] { converge(h); });
       else
-        solve_contacts(h, [&] { surfaces_.sweep(h, remaining_, [this, h] { sweep(h); }); });
+        solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, [this, h] { return sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
     } else {
       for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
@@ -106,12 +116,23 @@ class SubCycle {
     add_driving_work(h / 2);
   }
 
-  // Once over the contacts with rigid bodies.
-  void sweep(Real h) {
+  // Once over the contacts with and between rigid bodies; returns whether that is to be done again.
+  bool sweep(Real h) {
+    Real change = rigid_contacts_.sweep();
     for (std::size_t k = 0; k < island_.bodies.size(); ++k) {
       const ContactWork work = penalty::solve_contacts(island_, k, h);
       outside_work_ += work.outside;
       island_.bodies[k]->step_flows.contact_loss += work.loss;
+      change = std::max(change, work.change);
+    }
+    if (rigid_contacts_.is_empty()) return false;
+    if (rigid_sweeps_ == 0) first_change_ = change;
+    return ++rigid_sweeps_ < most_rigid_sweeps && change > rigid_tolerance * first_change_ &&
+           change > rigid_negligible * rigid_contacts_.acceleration() * h;
+  }
+
+  void converge(Real h) {
+    while (sweep(h)) {
     }
   }
 
@@ -119,9 +140,13 @@ class SubCycle {
   // velocity, whose work is that of each part at the mean of the velocities before and after. What contacts change lies
   // too far on the side of the kick: where a particle is pressed against the ground and stays at rest, all of it.
   template <class Solve>
-  void solve_contacts(Real kick_time, const Solve& solve) {
+  void solve_contacts(Real kick_time, Real h, const Solve& solve) {
     for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
+    rigid_sweeps_ = 0;
+    rigid_contacts_.begin(h, since_contacts_);
     solve();
+    rigid_contacts_.end(since_contacts_);
+    since_contacts_ = 0;
     for (SteppedBody* body : island_.bodies) {
       const Particles& particles = body->particles;
       Real work = 0, shared = 0;
@@ -141,6 +166,7 @@ class SubCycle {
 
   // Rigid bodies, by what acts on them, and everything that is coupled, by the couplings.
   void kick_others(Real time) {
+    since_contacts_ += time;
     for (RigidBody& body : island_.rigid_bodies) body.velocity += time * body.acceleration;
     for (const Coupling* coupling : island_.couplings) kick(*coupling, island_, time);
   }
@@ -190,7 +216,11 @@ class SubCycle {
 
   Island& island_;
   SurfaceContacts& surfaces_;
+  RigidContacts rigid_contacts_;
   Real duration_, remaining_ = 0;
+  Real since_contacts_ = 0;  // time of the kicks since contacts were solved [s]
+  Real first_change_ = 0;    // of a normal speed by the first sweep [m/s]
+  int rigid_sweeps_ = 0;
   bool has_contacts_ = false, has_blocks_ = false, has_driven_particles_ = false;
   Real outside_work_ = 0;
 };

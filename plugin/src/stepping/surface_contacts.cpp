@@ -91,7 +91,7 @@ bool SurfaceContacts::refresh(Real h, Real remaining) {
   return changed;
 }
 
-void SurfaceContacts::sweep(Real h, Real remaining, const std::function<void()>& rigid_sweep) {
+void SurfaceContacts::sweep(Real h, Real remaining, const RigidSweep& rigid_sweep) {
   take_velocities();
   refresh(h, remaining);
   collect();
@@ -99,7 +99,7 @@ void SurfaceContacts::sweep(Real h, Real remaining, const std::function<void()>&
   guard(h, remaining, rigid_sweep);
 }
 
-void SurfaceContacts::close(Real h, const std::function<void()>& rigid_sweep) {
+void SurfaceContacts::close(Real h, const RigidSweep& rigid_sweep) {
   take_velocities();
   refresh(h, h);
   collect();
@@ -271,20 +271,22 @@ Vector3 SurfaceContacts::relative_velocity(const TouchingPair& pair) const {
   return sum;
 }
 
-bool SurfaceContacts::converge(Real h, const std::function<void()>& rigid_sweep) {
+bool SurfaceContacts::converge(Real h, const RigidSweep& rigid_sweep) {
   bool changed = false;
   Real first = 0;
   for (int sweep = 0; sweep < most_sweeps && !scratch_.pairs.empty(); ++sweep) {
-    rigid_sweep();
+    const bool again = rigid_sweep();
     bool hit = false;
     const Real worst = sweep_pairs(h, hit);
+    changed = changed || hit || again;
+    if (again) continue;
     if (!hit) break;
-    changed = true;
-    if (sweep == 0) first = worst;
+    if (first == 0) first = worst;
     if (worst < tolerance && (worst < relative_tolerance * first || worst < negligible)) break;
   }
-  rigid_sweep();
-  return changed || !island_.contacts.empty();
+  for (int sweep = 0; rigid_sweep() && sweep < most_sweeps; ++sweep) {
+  }
+  return changed || !island_.contacts.empty() || !island_.rigid_contacts.empty();
 }
 
 // How a unit impulse along `direction`, given at two points that are not on a line along it, turns the particles of the

@@ -70,6 +70,9 @@ struct SurfaceScratch {
 /// at 0.2 m/s and 20 m/s² at most.
 class SurfaceContacts {
  public:
+  /// Once over the contacts with and between rigid bodies; returns whether it is to be done again.
+  using RigidSweep = std::function<bool()>;
+
   explicit SurfaceContacts(Island& island);
 
   bool is_empty() const { return island_.surfaces.empty(); }
@@ -86,10 +89,10 @@ class SurfaceContacts {
 
   /// Before a drift of `h` [s] in which the particles move by their velocities. `rigid_sweep` is one sweep over the
   /// contacts with rigid bodies. `remaining`: of the step, the drift included [s].
-  void sweep(Real h, Real remaining, const std::function<void()>& rigid_sweep);
+  void sweep(Real h, Real remaining, const RigidSweep& rigid_sweep);
 
   /// The same where nothing drifts: takes the approach that the last half kick left.
-  void close(Real h, const std::function<void()>& rigid_sweep);
+  void close(Real h, const RigidSweep& rigid_sweep);
 
   /// After the drift.
   void drifted(Real h);
@@ -109,7 +112,7 @@ class SurfaceContacts {
   void take_positions();
   void take_velocities();
   bool refresh(Real h, Real remaining);
-  bool converge(Real h, const std::function<void()>& rigid_sweep);
+  bool converge(Real h, const RigidSweep& rigid_sweep);
   void collect();
   void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
@@ -123,7 +126,7 @@ class SurfaceContacts {
   Vector3 relative_velocity(const TouchingPair& pair) const;
 
   // The guard.
-  void guard(Real h, Real remaining, const std::function<void()>& rigid_sweep);
+  void guard(Real h, Real remaining, const RigidSweep& rigid_sweep);
   bool is_beyond_help() const;
   void find_failing(Real h);
   bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;

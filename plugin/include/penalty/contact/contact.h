@@ -29,4 +29,15 @@ struct Contact {
   Vector3 impulse = Vector3::Zero();  // on a, of the last sweep [N s], reported
 };
 
+/// Where two rigid bodies touch, or may: the point of a may not go below the plane through the point of b.
+struct RigidContact {
+  int a = -1, b = -1;                                              // indices into the rigid bodies of the island
+  Vector3 anchor_a = Vector3::Zero(), anchor_b = Vector3::Zero();  // in their frames [m]
+  Vector3 normal = Vector3::UnitY();                               // from b to a, in the frame of b
+  Real friction = 0;                                               // Coulomb coefficient
+  Real restitution = 0;                                            // of approach that is no resting contact
+
+  Vector3 force = Vector3::Zero();  // on a, of the last substep, be it of the last step [N]: where the next starts from
+};
+
 }  // namespace penalty

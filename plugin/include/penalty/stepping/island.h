@@ -90,6 +90,7 @@ struct Island {
   std::vector<Coupling*> couplings = {};
   std::vector<Contact> contacts = {};  // of this step; `advance` puts them in the order of the bodies of their sides a
   std::vector<SurfaceContact> surfaces = {};
+  std::vector<RigidContact> rigid_contacts = {};  // of this step
 
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};

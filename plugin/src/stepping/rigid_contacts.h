@@ -1,0 +1,56 @@
+// Contacts between rigid bodies, which the soft ones press on each other.
+#pragma once
+#include "penalty/stepping/island.h"
+
+namespace penalty {
+
+/// Sequential impulses on the velocities of a substep, summed and clipped contact by contact: E. Catto, Iterative Dynamics
+/// with Temporal Coherence (2005). Of the gap g and the relative normal speed u each asks u >= -g/h while the gap is open,
+/// u >= 0 when it is closed; depth comes back as in solve_contacts. Both bodies take the impulse at the same point, so both
+/// momenta are kept. Friction is clipped to Coulomb's cone.
+class RigidContacts {
+ public:
+  explicit RigidContacts(Island& island);
+
+  Real acceleration() const { return acceleration_; }
+  bool is_empty() const { return island_.rigid_contacts.empty(); }
+
+  /// Before the sweeps of a drift of h [s]; `since` [s] is how long forces acted since the last: as in the last one, they
+  /// are met by its impulses.
+  void begin(Real h, Real since);
+
+  /// Returns the largest change of a normal speed [m/s].
+  Real sweep();
+
+  /// Keeps what the sweeps came to.
+  void end(Real since);
+
+  /// Begins an attempt at the step with the forces that the contacts had before it.
+  void begin_attempt();
+
+  /// Of bodies that move and take no impulse, and of taking depth back, in this attempt [J].
+  Real outside_work() const { return outside_work_; }
+
+ private:
+  struct Row {
+    RigidBody *a, *b;
+    Vector3 arm_a, arm_b, normal;
+    Real mobility, wanted, recovery;
+    bool is_impact = false;
+    Real impulse = 0;
+    Vector3 friction_impulse = Vector3::Zero();
+  };
+
+  static Vector3 relative_velocity(const Row& row) {
+    return row.a->velocity_at(row.arm_a) - row.b->velocity_at(row.arm_b);
+  }
+  void push(const Row& row, const Vector3& impulse);
+
+  Island& island_;
+  Real acceleration_ = 0;  // largest of a body [m/s²]
+  std::vector<Row> rows_;
+  std::vector<Vector3> start_;  // forces before the step
+  Real outside_work_ = 0;
+};
+
+}  // namespace penalty

@@ -1,0 +1,113 @@
+// Contacts between rigid bodies of an island, in closed form. A particle far away makes it an island.
+#include <numbers>
+
+#include "stepping/islands.h"
+
+namespace penalty::testing {
+namespace {
+
+constexpr Real frame = 1.0 / 60;
+
+RigidBody cube(Real mass, Real size, const Vector3& position, const Vector3& velocity = Vector3::Zero()) {
+  RigidBody body;
+  body.position = position;
+  body.velocity = velocity;
+  body.inverse_mass = Vector3::Constant(1 / mass);
+  body.inverse_inertia = Matrix3::Identity() * (6 / (mass * size * size));
+  return body;
+}
+
+struct RigidIsland {
+  Body particle = make_free_particles(Eigen::Matrix3Xd(Vector3(100, 0, 0)), {1});
+  Island island;
+
+  RigidIsland() { island.bodies = {&particle.body}; }
+  RigidBody& operator[](std::size_t k) { return island.rigid_bodies[k]; }
+
+  // The four lower corners of cube `a` on the top of `b`, where they are now.
+  void stand(int a, int b, Real size, Real friction = 0, Real restitution = 0) {
+    RigidBody &upper = island.rigid_bodies[a], &lower = island.rigid_bodies[b];
+    for (const Real x : {-size / 2, size / 2})
+      for (const Real z : {-size / 2, size / 2}) {
+        const Vector3 corner = upper.position + upper.rotation * Vector3(x, -size / 2, z);
+        const Vector3 under(corner.x(), lower.position.y() + size / 2, corner.z());
+        island.rigid_contacts.push_back({.a = a,
+                                         .b = b,
+                                         .anchor_a = {x, -size / 2, z},
+                                         .anchor_b = lower.rotation.transpose() * (under - lower.position),
+                                         .friction = friction,
+                                         .restitution = restitution});
+      }
+  }
+  void step(int count = 1) {
+    for (int k = 0; k < count; ++k) advance(island, frame);
+  }
+};
+
+TEST(RigidContact, AHitKeepsTheMomentumAndGivesBackItsShare) {
+  for (const Real restitution : {0.0, 0.5, 1.0}) {
+    SCOPED_TRACE(restitution);
+    RigidIsland s;
+    s.island.rigid_bodies = {cube(1, 1, {0, 2, 0}, {0, -3, 0}), cube(2, 1, {0, 0, 0})};
+    s.stand(0, 1, 1, 0, restitution);
+    s.step(60);
+    EXPECT_NEAR(s[0].velocity.y(), -1 + 2 * restitution, 1e-3);  // sweeps end
+    EXPECT_NEAR(s[1].velocity.y(), -1 - restitution, 1e-3);
+    EXPECT_LT(s[0].angular_velocity.norm() + s[1].angular_velocity.norm(), 2e-3);
+    EXPECT_LT((s[0].velocity + 2 * s[1].velocity - Vector3(0, -3, 0)).norm(), 1e-13);
+  }
+}
+
+TEST(RigidContact, AHitOffTheCentreKeepsBothMomenta) {
+  RigidIsland s;
+  s.island.rigid_bodies = {cube(1, 1, {0.4, 1.7, 0.3}, {0.5, -3, 0}), cube(2, 1, {0, 0, 0})};
+  s[0].angular_velocity = {1, -2, 0.5};
+  s.stand(0, 1, 1, 0.5);
+  const Momentum before = momentum({}, s.island.rigid_bodies);
+  s.step(30);
+  const Momentum after = momentum({}, s.island.rigid_bodies);
+  EXPECT_LT((after.linear - before.linear).norm(), 1e-13);
+  EXPECT_LT((after.angular - before.angular).norm(), 1e-12);
+  EXPECT_GT(s[0].velocity.y(), -2.5) << "did not hit";
+}
+
+// The lightest carries 130 times its mass.
+TEST(RigidContact, ATowerOfAnyMassesStaysWhereItIs) {
+  RigidIsland s;
+  RigidBody ground;
+  s.island.rigid_bodies = {ground};
+  const std::array masses{10.0, 1.0, 30.0, 100.0};
+  for (std::size_t k = 0; k < masses.size(); ++k) {
+    s.island.rigid_bodies.push_back(cube(masses[k], 1, {0, static_cast<Real>(k) + 1, 0}));
+    s.island.rigid_bodies.back().acceleration = {0, -10, 0};
+  }
+  for (int k = 0; k < static_cast<int>(masses.size()); ++k) s.stand(k + 1, k, 1, 0.5);
+  s.particle.body.options.substeps = 16;
+  s.step(120);
+  for (std::size_t k = 0; k < masses.size(); ++k) {
+    EXPECT_LT((s[k + 1].position - Vector3(0, static_cast<Real>(k) + 1, 0)).norm(), 1e-3) << k;
+    EXPECT_GT(s[k + 1].rotation(1, 1), 1 - 1e-6) << k;
+  }
+}
+
+TEST(RigidContact, ACubeSlidesDownASlopeWithTheCoulombAcceleration) {
+  const Real angle = std::numbers::pi / 6, gravity = 10;
+  for (const Real friction : {0.0, 0.2, 0.6}) {
+    SCOPED_TRACE(friction);
+    RigidIsland s;
+    s.island.rigid_bodies = {RigidBody(), cube(3, 0.2, {0, 0.2, 0})};
+    s[1].acceleration = gravity * Vector3(std::sin(angle), -std::cos(angle), 0);
+    s.particle.body.options.substeps = 8;
+    const Real a = std::max<Real>(gravity * (std::sin(angle) - friction * std::cos(angle)), 0);
+    for (int k = 0; k < 30; ++k) {
+      s.island.rigid_contacts.clear();  // found anew in each step, as the corners slide on
+      s.stand(1, 0, 0.2, friction);
+      s.step();
+    }
+    EXPECT_NEAR(s[1].velocity.x(), a * 0.5, 0.01 * gravity * 0.5);
+    EXPECT_NEAR(s[1].position.y(), 0.2, 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace penalty::testing
