@@ -42,15 +42,14 @@ Real radius_about_origin(const btCollisionShape& shape) {
   return center.length() + radius;
 }
 
-// How far a rigid body may come towards a soft one in a step.
+}  // namespace
+
 Real reach_of(const btRigidBody& rigid, Real duration) {
   return duration * (Real(rigid.getLinearVelocity().length()) +
                      Real(rigid.getAngularVelocity().length()) *
                          std::min(radius_about_origin(*rigid.getCollisionShape()), 1e6)) +
          Real(rigid.getGravity().length()) * duration * duration;
 }
-
-}  // namespace
 
 Box bounds_of(const btCollisionObject& object) {
   btVector3 low, high;

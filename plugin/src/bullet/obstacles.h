@@ -5,6 +5,7 @@
 #include "penalty/contact/box.h"
 
 class btCollisionObject;
+class btRigidBody;
 class btSoftBody;
 
 namespace penalty {
@@ -13,6 +14,9 @@ struct HeldBody;
 class RigidBodies;
 class RigidSurfaces;
 struct WorldIsland;
+
+/// How far a rigid body may come in a step [m].
+Real reach_of(const btRigidBody& rigid, Real duration);
 
 Box bounds_of(const btCollisionObject& object);
 

@@ -74,6 +74,11 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
   return static_cast<int>(touched.size()) - 1;
 }
 
+void RigidBodies::expect_no_others(TouchedRigidBody& touched) const {
+  if (touched.body->getNumConstraintRefs() == 0)
+    touched.start.acceleration = known_acceleration(*touched.body, gravity_applied_);
+}
+
 void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states) {
   for (std::size_t k = 0; k < touched.size(); ++k) {
     TouchedRigidBody& t = touched[k];

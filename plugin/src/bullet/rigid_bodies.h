@@ -28,6 +28,9 @@ class RigidBodies {
   /// it.
   int touch(btCollisionObject& object, bool approached, std::vector<TouchedRigidBody>& touched) const;
 
+  /// What pushed a body without joints in the last step is among the contacts of the island: it is not expected again.
+  void expect_no_others(TouchedRigidBody& touched) const;
+
   /// Adds to the velocities what soft bodies did to them.
   void hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states);
 

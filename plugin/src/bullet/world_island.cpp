@@ -30,6 +30,11 @@ void WorldIsland::absorb(WorldIsland& from) {
     if (pair.touched >= 0) pair.touched = renumbered[pair.touched];
     surfaces.push_back(pair);
   }
+  for (RigidContact contact : from.rigid_contacts) {
+    contact.a = renumbered[contact.a];
+    contact.b = renumbered[contact.b];
+    rigid_contacts.push_back(contact);
+  }
   from = {};
 }
 
@@ -46,6 +51,7 @@ void WorldIsland::advance(Real duration, Island& island) {
   island.rigid_bodies.clear();
   for (const TouchedRigidBody& t : touched) island.rigid_bodies.push_back(t.start);
   island.contacts = contacts;
+  island.rigid_contacts = rigid_contacts;
   island.surfaces.clear();
   for (std::size_t k = 0; k < held.size(); ++k) held[k]->number = static_cast<int>(k);
   for (const auto& [pair, a, b, touched_by] : surfaces)
@@ -69,6 +75,7 @@ void WorldIsland::advance(Real duration, Island& island) {
     island.couplings.push_back(&coupling->stepped);
   }
   penalty::advance(island, duration);
+  rigid_contacts = island.rigid_contacts;
 }
 
 }  // namespace penalty

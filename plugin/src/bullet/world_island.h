@@ -18,6 +18,7 @@ struct WorldIsland {
   std::vector<HeldCoupling*> couplings;
   std::vector<Contact> contacts;
   std::vector<HeldPair> surfaces;
+  std::vector<RigidContact> rigid_contacts;
 
   /// Takes in what `from` holds, which is empty afterwards.
   void absorb(WorldIsland& from);

@@ -130,6 +130,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   couplings.hold_coupled();
   join_islands(duration);
   for (WorldIsland& island : islands_) advance(island, duration);
+  rigid_manifolds_.remember(islands_);
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) stepped_.push_back(held);
 }
@@ -158,12 +159,15 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   islands_.push_back(std::move(island));
 }
 
-// Bodies that are coupled, may touch each other, or touch the same movable rigid body, are stepped together.
+// Bodies that are coupled, may touch each other, or touch the same movable rigid body, or one that touches it, are stepped
+// together.
 void AttachedBodies::World::join_islands(Real duration) {
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.front()->outcome == StepOutcome::held; });
   couplings.join(islands_, rigid_bodies_);
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.empty(); });
   surfaces_.join(islands_, *bodies, duration);
+  if (!islands_.empty())
+    rigid_manifolds_.add(islands_, *islands_.front().held.front()->body->getWorldInfo(), rigid_bodies_, duration);
   for (std::size_t i = 0; i < islands_.size(); ++i)
     for (std::size_t j = i + 1; j < islands_.size();)
       if (!islands_[j].held.empty() && islands_[i].shares_a_rigid_body_with(islands_[j])) {

@@ -7,6 +7,7 @@
 #include "couplings.h"
 #include "held_bodies.h"
 #include "rigid_bodies.h"
+#include "rigid_manifolds.h"
 #include "rigid_surfaces.h"
 #include "surfaces.h"
 #include "world_island.h"
@@ -44,6 +45,7 @@ class AttachedBodies::World {
   void advance(WorldIsland& island, Real duration) noexcept;
 
   RigidBodies rigid_bodies_;
+  RigidManifolds rigid_manifolds_;
   RigidSurfaces rigid_surfaces_;
   Surfaces surfaces_;
   std::vector<WorldIsland> islands_;
