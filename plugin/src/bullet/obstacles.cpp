@@ -115,7 +115,9 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       friction = 0;
       friction_is_finite = false;
     }
+    const bool is_movable = rigid && !rigid->isStaticOrKinematicObject();
     const auto add_point = [&](const WeightedPoint& point) {
+      if (!is_movable && point.mobility(particles.inverse_masses) <= 0) return;  // two that are held
       const Vector3 x = point.of(particles.positions);
       if (!object_box.contains(x, reach)) return;
       surface.clear();
@@ -134,8 +136,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       }
     };
     if (held.options.contact_points.empty()) {
-      for (int i = 0; i < particles.size(); ++i)
-        if (particles.inverse_masses[i] > 0) add_point(WeightedPoint::at_particle(i));
+      for (int i = 0; i < particles.size(); ++i) add_point(WeightedPoint::at_particle(i));
     } else {
       for (const WeightedPoint& point : held.options.contact_points) add_point(point);
     }
