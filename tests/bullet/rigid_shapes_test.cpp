@@ -1,14 +1,12 @@
 // A soft ball falls on each kind of rigid shape and stays on top of it.
 #include "bullet/simulation.h"
 
-#include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
-#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 
 #include "surface_distance.h"
 
@@ -114,20 +112,6 @@ TEST_P(Landing, Compound) {
     compound->addChildShape(transform, &beam);
   }
   land(std::move(compound), turned(0.7, Vector3::UnitY()), 0.5);
-}
-
-TEST_P(Landing, TriangleMesh) {
-  btTriangleMesh triangles;
-  const int cells = 8;
-  const auto point = [](int i, int k) { return btVector3(btScalar(i * 0.25 - 1), 0, btScalar(k * 0.25 - 1)); };
-  for (int i = 0; i < cells; ++i)
-    for (int k = 0; k < cells; ++k) {
-      triangles.addTriangle(point(i, k), point(i, k + 1), point(i + 1, k));
-      triangles.addTriangle(point(i + 1, k), point(i, k + 1), point(i + 1, k + 1));
-    }
-  auto mesh = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
-  const Real top = Real(mesh->getMargin());
-  land(std::move(mesh), turned(0.6, Vector3::UnitY()), top);
 }
 
 INSTANTIATE_TEST_SUITE_P(World, Landing, both_worlds(), param_name);

@@ -3,14 +3,12 @@
 
 #include "surface_distance.h"
 
-#include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
-#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 
 #include <functional>
 
@@ -167,95 +165,6 @@ TEST(SurfaceDistance, BeyondItsReachNothingIsFound) {
   EXPECT_EQ(surface_points(sphere, {1.75, 0, 0}, 1.01).size(), 1u);
   const btConeShape cone(1, 1);
   EXPECT_EQ(surface_points(cone, {0, 5, 0}, 1).size(), 0u);
-}
-
-// Triangles of a closed polyhedron, counter-clockwise from outside.
-class Mesh {
- public:
-  Mesh(const std::vector<Vector3>& vertices, const std::vector<std::array<int, 3>>& triangles, Real margin) {
-    for (const auto& [a, b, c] : triangles)
-      triangles_.addTriangle(to_bullet(vertices[a]), to_bullet(vertices[b]), to_bullet(vertices[c]));
-    shape_ = std::make_unique<btBvhTriangleMeshShape>(&triangles_, true);
-    shape_->setMargin(static_cast<btScalar>(margin));
-  }
-  const btCollisionShape& shape() const { return *shape_; }
-
- private:
-  btTriangleMesh triangles_;
-  std::unique_ptr<btBvhTriangleMeshShape> shape_;
-};
-
-Mesh box_mesh(const Vector3& half, Real margin) {
-  std::vector<Vector3> vertices;
-  vertices.reserve(8);
-  for (int corner = 0; corner < 8; ++corner)
-    vertices.emplace_back(corner & 1 ? half.x() : -half.x(), corner & 2 ? half.y() : -half.y(),
-                          corner & 4 ? half.z() : -half.z());
-  return {vertices,
-          {{0, 2, 1},
-           {1, 2, 3},
-           {4, 5, 6},
-           {5, 7, 6},
-           {0, 1, 4},
-           {1, 5, 4},
-           {2, 6, 3},
-           {3, 6, 7},
-           {0, 4, 2},
-           {2, 4, 6},
-           {1, 3, 5},
-           {3, 7, 5}},
-          margin};
-}
-
-TEST(SurfaceDistance, OfATriangleMeshIsThatOfTheSolidThatItBounds) {
-  const Vector3 half(0.5, 0.4, 0.7);
-  const Mesh mesh = box_mesh(half, 0);
-  expect_distance(
-      mesh.shape(), [&](const Vector3& p) { return box_distance(p, half); }, limit(1e-12, 1e-6), limit(1e-12, 1e-6));
-}
-
-TEST(SurfaceDistance, OfATriangleMeshIsLiftedByItsMargin) {
-  const Vector3 half(0.5, 0.4, 0.7);
-  const Mesh mesh = box_mesh(half, 0.1);
-  const std::vector<SurfacePoint> found = surface_points(mesh.shape(), {0.1, 0.9, 0.1});
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_NEAR(found[0].distance, 0.4, 1e-6);
-  EXPECT_NEAR(found[0].point.y(), 0.5, 1e-6);
-}
-
-// Where two faces meet at less than a right angle, a point beyond the edge is in front of one and behind the other.
-TEST(SurfaceDistance, BeyondTheSharpEdgesOfAMeshIsOutside) {
-  const std::vector<Vector3> corners = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
-  const std::vector<std::array<int, 3>> faces = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
-  const Mesh mesh(corners, faces, 0);
-  Random random(5);
-  int outside_of_edge = 0;
-  for (int k = 0; k < 2000; ++k) {
-    const Vector3 p = random.vector(1.5);
-    Real most_outside = -1e9;
-    int in_front = 0;
-    for (const auto& [a, b, c] : faces) {
-      const Vector3 n = (corners[b] - corners[a]).cross(corners[c] - corners[a]).normalized();
-      const Real height = n.dot(p - corners[a]);
-      most_outside = std::max(most_outside, height);
-      in_front += height > 0;
-    }
-    const std::vector<SurfacePoint> found = surface_points(mesh.shape(), p);
-    ASSERT_EQ(found.size(), 1u);
-    ASSERT_EQ(found[0].distance > 0, most_outside > 0) << "sample " << k << " at " << p.transpose();
-    outside_of_edge += in_front == 1 && found[0].distance > most_outside + 1e-6;
-  }
-  EXPECT_GT(outside_of_edge, 20);
-}
-
-TEST(SurfaceDistance, OfAFlatMeshIsNegativeBehindIt) {
-  const Mesh mesh({{-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}}, {{0, 2, 1}, {0, 3, 2}}, 0);
-  for (const Real y : {0.25, -0.25, 0.0}) {
-    const std::vector<SurfacePoint> found = surface_points(mesh.shape(), {0.3, y, 0.2});
-    ASSERT_EQ(found.size(), 1u);
-    EXPECT_NEAR(found[0].distance, y, 1e-7);
-    EXPECT_NEAR(found[0].normal.y(), 1, 1e-7);
-  }
 }
 
 }  // namespace

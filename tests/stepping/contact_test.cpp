@@ -160,6 +160,64 @@ TEST(Contact, APinnedPointIsLeftAlone) {
   EXPECT_EQ(p.x(), Vector3(0, -1, 0));
 }
 
+TEST(Contact, APinnedParticleStopsARigidBodyAndTakesItsDepthBack) {
+  // Its side of the contact is then the one that cannot move: at (depth - slop) / 0.05 s, without a change of anything
+  // else.
+  Body particle = make_free_particles(Eigen::Matrix3Xd(Vector3(0, 0, 0)), {1});
+  particle.particles().inverse_masses[0] = 0;
+  particle.body.options.substeps = 10;
+  RigidBody sphere = make_sphere(2, 1, {0, 1.5, 0});
+  sphere.acceleration = Vector3(0, -gravity, 0);
+  particle.touch(WeightedPoint::at_particle(0), 0, {0, -1, 0}, {0, -1, 0});
+  for (int step = 0; step < 60; ++step) {
+    advance(particle, 1.0 / 60, std::span(&sphere, 1));
+    ASSERT_GE(sphere.position.y(), 1 - 1e-14);
+    ASSERT_EQ(particle.body.report.retries, 0);
+  }
+  EXPECT_NEAR(sphere.position.y(), 1, 1e-14);
+  EXPECT_EQ(particle.position(0), Vector3(0, 0, 0));
+  EXPECT_EQ(particle.velocity(0), Vector3(0, 0, 0));
+  sphere.position.y() = 0.98;
+  const Real slop = particle.body.options.contact_slop;
+  for (int step = 1; step <= 20; ++step) {
+    advance(particle, 1.0 / 60, std::span(&sphere, 1));
+    ASSERT_NEAR(1 - sphere.position.y(), slop + (0.02 - slop) * std::pow(1 - 1.0 / 600 / 0.05, 10 * step), 1e-12);
+    ASSERT_EQ(particle.body.report.retries, 0);
+  }
+}
+
+TEST(Contact, ADrivenPointPushesARigidBodyAndItsDriverDoesTheWork) {
+  // One of three particles is driven, at 3 m/s, and carries 0.4 of the point.
+  for (const bool all : {false, true}) {
+    SCOPED_TRACE(all ? "all driven" : "one driven");
+    Eigen::Matrix3Xd positions(3, 3);
+    positions << -2, -2, -2, -1, 1, 0, 0, 0, 0;
+    Body body = make_free_particles(positions, {1, 1, 1});
+    for (int i = 0; i < 3; ++i) {
+      if (i == 0 || all) body.particles().inverse_masses[i] = 0;
+      body.set_velocity(i, {3, 0, 0});
+    }
+    body.body.options.substeps = 8;
+    RigidBody sphere = make_sphere(200, 1, {0, 0, 0});
+    const WeightedPoint point{{0, 1, 2}, {0.4, 0.4, 0.2}, 3};
+    body.touch(point, 0, {-1, 0, 0}, {-1, 0, 0});
+    for (int step = 0; step < 30; ++step) {
+      advance(body, 1.0 / 60, std::span(&sphere, 1));
+      ASSERT_EQ(body.body.report.retries, 0) << "its energy is accounted for";
+    }
+    EXPECT_EQ(body.velocity(0), Vector3(3, 0, 0));
+    const Vector3 at_point = point.of(body.particles().velocities);
+    EXPECT_NEAR(sphere.velocity.x() - at_point.x(), 0, 1e-13) << "perfectly plastic";
+    if (all) {
+      EXPECT_NEAR(sphere.velocity.x(), 3, 1e-13);
+      EXPECT_NEAR(body.body.flows.contact_loss, 200 * 9.0 / 2, 1e-9) << "as much as the sphere got";
+    } else {
+      EXPECT_LT(sphere.velocity.x(), 0.1) << "the free particles gave way";
+      EXPECT_GT(sphere.velocity.x(), 0.01);
+    }
+  }
+}
+
 TEST(Contact, ACentralHitOnAFreeBodyIsPerfectlyPlastic) {
   Body particle = make_free_particles(Eigen::Matrix3Xd(Vector3(-2, 0, 0)), {1});
   particle.set_velocity(0, {3, 0, 0});

@@ -59,6 +59,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
     held->field.add(std::move(field));
     held->options = options;
     held->surface.reset();
+    held->mesh_sides.forget();
     held->stepped.options = options.step;
     held->stale = true;
     held->stepped.positions_changed();

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "identity.h"
+#include "mesh_sides.h"
 #include "nodes.h"
 #include "penalty/bullet/attached_bodies.h"
 #include "penalty/contact/contact_surface.h"
@@ -34,6 +35,7 @@ struct HeldBody {
   std::uint64_t estimated_version = 0;      // of the field's stiffness
   std::shared_ptr<ContactSurface> surface;  // made when it is needed first,
   std::array<int, 2> surface_size{};        // of so many faces and links
+  MeshSides mesh_sides;                     // of its points
   int listed = 0;                           // step in which the world last had the body; 0: none so far
 
   // Of this step.

@@ -84,6 +84,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   SteppedBody& stepped = held.stepped;
   const Particles& particles = stepped.particles;
   btSoftBody& body = *held.body;
+  held.mesh_sides.begin_step();
   if (!body.hasContactResponse()) return true;
 
   const Real margin = body.getCollisionShape()->getMargin();
@@ -124,12 +125,23 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       const bool approached = fastest > waking_speed && object_box.overlaps(box, 2 * margin);
       island.surfaces.push_back({pair, &held, nullptr, rigid_bodies.touch(*object, approached, island.touched)});
     }
-    const auto add_point = [&](const WeightedPoint& point) {
+    // That a point will go relative to the object, left to itself.
+    const auto way_of = [&](const Vector3& v, const Vector3& x) {
+      const Vector3 of_object = rigid && !rigid->isStaticObject()
+                                    ? to_vector(rigid->getVelocityInLocalPoint(to_bullet(Vector3(x - origin))))
+                                    : Vector3(Vector3::Zero());
+      return Vector3(duration * (v - of_object + duration * stepped.gravity));
+    };
+    const bool is_movable = rigid && !rigid->isStaticOrKinematicObject();
+    held.mesh_sides.approach(*object, {particles, held.field, held.options.contact_points}, margin + reach);
+    const auto add_point = [&](int number, const WeightedPoint& point) {
+      if (!is_movable && point.mobility(particles.inverse_masses) <= 0) return;  // two that are held
       const Vector3 x = point.of(particles.positions);
-      if (!object_box.contains(x, reach)) return;
+      if (!object_box.contains(x, reach) && !held.mesh_sides.follows(number)) return;
       surface.clear();
       append_surface_points(*object->getCollisionShape(), rotation.transpose() * (x - origin), margin + reach, surface);
-      const Vector3 v = surface.empty() ? Vector3(Vector3::Zero()) : point.of(particles.velocities);
+      const Vector3 v = point.of(particles.velocities);
+      held.mesh_sides.append_planes(number, rotation.transpose() * way_of(v, x), margin, margin + reach, surface);
       for (const SurfacePoint& nearest : surface) {
         const bool approached = -v.dot(rotation * nearest.normal) > waking_speed;
         const Real radius = nearest.radius > 0 ? nearest.radius + margin : 0;
@@ -143,10 +155,10 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       }
     };
     if (held.options.contact_points.empty()) {
-      for (int i = 0; i < particles.size(); ++i)
-        if (particles.inverse_masses[i] > 0) add_point(WeightedPoint::at_particle(i));
+      for (int i = 0; i < particles.size(); ++i) add_point(i, WeightedPoint::at_particle(i));
     } else {
-      for (const WeightedPoint& point : held.options.contact_points) add_point(point);
+      int number = 0;
+      for (const WeightedPoint& point : held.options.contact_points) add_point(number++, point);
     }
   }
   return friction_is_finite;

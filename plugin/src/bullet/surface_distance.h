@@ -18,8 +18,7 @@ struct SurfacePoint {
 
 /// Appends the nearest surface points of `shape` to `point`, in the frame of the shape and within `reach` [m], one for
 /// each convex part. In closed form for planes, spheres, boxes and capsules; by GJK and EPA for other convex shapes;
-/// child by child for compounds; by the nearest triangle for concave meshes, whose triangles face the counter-clockwise
-/// side.
+/// child by child for compounds. Triangle meshes, which have no inside, are left to MeshSides.
 void append_surface_points(const btCollisionShape& shape, const Vector3& point, Real reach,
                            std::vector<SurfacePoint>& found);
 

@@ -1,6 +1,7 @@
 #include "contact_sweep.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace penalty {
 namespace {
@@ -54,6 +55,116 @@ class Opposite {
   Vector3 arm_, offset_, normal_, velocity_;
 };
 
+// What an impulse on the point gives to whoever drives the particles of it that are held [J].
+Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles) {
+  Real work = 0;
+  for (int k = 0; k < point.size; ++k)
+    if (const int i = point.particles[k]; particles.inverse_masses[i] == 0)
+      work += point.weights[k] * impulse.dot(particles.velocities.col(i).head<3>());
+  return work;
+}
+
+// The contacts of points that are held with what may move. Nothing gives way on their side: pushed off one by one, what
+// lies on many of them would spin and hop. So their impulses are one solution of the same conditions, by projected
+// Gauss-Seidel: each may be taken back as far as it was given. It begins with equal shares.
+class HeldContacts {
+ public:
+  HeldContacts(Island& island, std::size_t body, Real duration, ContactWork& work)
+      : island_(island),
+        contacts_(contacts_of(island, body)),
+        particles_(island.bodies[body]->particles),
+        slop_(island.bodies[body]->options.contact_slop),
+        duration_(duration),
+        work_(work) {}
+
+  void solve() {
+    constexpr int most_passes = 30;
+    constexpr Real tolerance = 1e-5;  // of the largest change of a speed at the beginning
+    const Real first = share();
+    work_.change = std::max(work_.change, first);
+    for (int pass = 0; pass < most_passes; ++pass) {
+      Real largest = 0;
+      for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        Contact& contact = contacts_[pass % 2 == 0 ? k : contacts_.size() - 1 - k];
+        if (is_between(contact)) largest = std::max(largest, give(contact, impulse_of(contact)));
+      }
+      if (largest <= tolerance * first) return;
+    }
+  }
+
+ private:
+  Opposite opposite_of(const Contact& contact) const {
+    return {island_, contact, contact.a.point.of(particles_.positions)};
+  }
+  static Vector3 normal_of(const Contact& contact, const Opposite& opposite) {
+    return contact.radius > 0 && !opposite.offset().isZero(0) ? Vector3(opposite.offset().normalized())
+                                                              : opposite.normal();
+  }
+  Real wanted_speed(Real gap) const {
+    return gap > 0 ? -gap / duration_
+                   : std::clamp<Real>((-gap - slop_) / std::max(recovery_time, duration_), 0, recovery_speed);
+  }
+
+  bool is_between(const Contact& contact) const {
+    return contact.a.point.mobility(particles_.inverse_masses) <= 0 && !opposite_of(contact).is_obstacle();
+  }
+
+  // Each as if it were the only one, divided by the number of those that come closer.
+  Real share() {
+    Real number = 0, largest = 0;
+    for (Contact& contact : contacts_) {
+      if (!is_between(contact)) continue;
+      contact.impulse = impulse_of(contact);
+      number += !contact.impulse.isZero(0);
+    }
+    for (Contact& contact : contacts_) {
+      if (!is_between(contact) || contact.impulse.isZero(0)) continue;
+      const Vector3 shared = contact.impulse / number;
+      contact.impulse.setZero();
+      largest = std::max(largest, give(contact, shared));
+    }
+    return largest * number;
+  }
+
+  // What it should have been given.
+  Vector3 impulse_of(Contact& contact) const {
+    const Opposite opposite = opposite_of(contact);
+    const Vector3 normal = normal_of(contact, opposite);
+    const Real gap = normal.dot(opposite.offset()) - contact.radius;
+    contact.depth = std::max(contact.depth, -gap);
+    const Vector3 relative = contact.a.point.of(particles_.velocities) - opposite.velocity();
+    const Real speed = normal.dot(relative), given = normal.dot(contact.impulse);
+    const Real pressed = std::max<Real>(given + (wanted_speed(gap) - speed) / opposite.mobility(normal), 0);
+    Vector3 rubbed = contact.impulse - given * normal;
+    const Vector3 slip = relative - speed * normal;
+    if (const Real slip_speed = slip.norm(); contact.friction > 0 && slip_speed > 1e-12)
+      rubbed -= slip / opposite.mobility(slip / slip_speed);
+    const Real size = rubbed.norm(), most = contact.friction * pressed;
+    if (size > most) rubbed *= most / size;
+    return pressed * normal + rubbed;
+  }
+
+  // Returns the change of its speed [m/s].
+  Real give(Contact& contact, const Vector3& impulse) {
+    const Opposite opposite = opposite_of(contact);
+    const Vector3 normal = normal_of(contact, opposite), change = impulse - contact.impulse;
+    const Vector3 at_point = contact.a.point.of(particles_.velocities), relative = at_point - opposite.velocity();
+    const Real gap = normal.dot(opposite.offset()) - contact.radius;
+    const Real recovery = normal.dot(change) * std::max<Real>(wanted_speed(gap), 0);
+    work_.outside += recovery - change.dot(at_point);
+    work_.loss += recovery - change.dot(relative) - opposite.mobility(change) / 2;
+    opposite.push(-change);
+    contact.impulse = impulse;
+    return std::abs(normal.dot(change)) * opposite.mobility(normal);
+  }
+
+  Island& island_;
+  std::span<Contact> contacts_;
+  const Particles& particles_;
+  Real slop_, duration_;
+  ContactWork& work_;
+};
+
 }  // namespace
 
 void sort_contacts(Island& island) {
@@ -74,13 +185,17 @@ bool is_in_contact(const Island& island, std::size_t body) {
 
 ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
   ContactWork work;
+  bool has_held = false;
   Particles& particles = island.bodies[body]->particles;
   const Real slop = island.bodies[body]->options.contact_slop;
   for (Contact& contact : contacts_of(island, body)) {
     const WeightedPoint& point = contact.a.point;
     contact.impulse.setZero();
     const Real point_mobility = point.mobility(particles.inverse_masses);
-    if (point_mobility <= 0) continue;
+    if (point_mobility <= 0) {
+      has_held = true;
+      continue;
+    }
 
     const Opposite opposite(island, contact, point.of(particles.positions));
     const Vector3& offset = opposite.offset();
@@ -111,12 +226,14 @@ ContactWork solve_contacts(Island& island, std::size_t body, Real duration) {
     work.outside += recovery;
     work.loss +=
         recovery - impulse.dot(relative) - (point_mobility * impulse.squaredNorm() + opposite.mobility(impulse)) / 2;
+    work.outside -= driving_work(point, impulse, particles);
     point.add_push(impulse, particles.inverse_masses, particles.velocities);
     if (opposite.is_obstacle())
       work.outside += impulse.dot(obstacle_velocity);
     else
       opposite.push(-impulse);
   }
+  if (has_held) HeldContacts(island, body, duration, work).solve();
   return work;
 }
 

@@ -14,7 +14,8 @@ struct ContactWork {
 /// One sweep over the contacts of body `body` of the island at positions that are about to drift for `duration` h [s].
 /// Of the gap g and the relative normal speed u the sweep asks u >= -g/h while the gap is open and u >= 0 when it is
 /// closed: it stops approach. Depth beyond the slop of the body is taken back: there it asks u >= depth / 0.05 s, at most
-/// half a metre a second, and what that gives is work from outside. The impulse goes to side a and,
+/// half a metre a second, and what that gives is work from outside. So is what driven particles give to a body that they
+/// push; two that cannot move are left alone. The impulse goes to side a and,
 /// with the opposite sign, to side b: to a rigid body at the point of a, so that both momenta are kept to round-off.
 /// Friction is clipped to Coulomb's cone.
 ContactWork solve_contacts(Island& island, std::size_t body, Real duration);

@@ -19,6 +19,7 @@ constexpr Real retry_growth = 1.5;       // substeps of a repeated step
 constexpr int most_rigid_sweeps = 50;    // of a substep; they end when one changes speeds by less than
 constexpr Real rigid_tolerance = 1e-3;   // this share of the first,
 constexpr Real rigid_negligible = 0.02;  // or of what accelerations make of them
+constexpr int fewest_on_held = 8;        // substeps where a rigid body may lie on points that are held
 constexpr Real substep_memory = 0.8;     // share of the last step's substeps that the next one starts from
 
 // v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
@@ -293,6 +294,13 @@ void report_contacts(const Island& island) {
 
 int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
   int substeps = surfaces.least_substeps();
+  // It ends a step half a substep's fall too fast, whatever holds it.
+  if (std::any_of(island.contacts.begin(), island.contacts.end(), [&](const Contact& contact) {
+        const std::vector<Real>& inverse_masses = island.bodies[contact.a.body]->particles.inverse_masses;
+        return contact.b.is_rigid() && island.rigid_bodies[contact.b.rigid].is_dynamic() &&
+               contact.a.point.mobility(inverse_masses) <= 0;
+      }))
+    substeps = std::max(substeps, fewest_on_held);
   Real coupling_eigenvalue = 0;  // eigenvalues of a sum are no larger than the sum of the largest
   for (const Coupling* coupling : island.couplings) coupling_eigenvalue += coupling->largest_eigenvalue;
   for (std::size_t k = 0; k < island.bodies.size(); ++k) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "penalty/stepping/stable_step.h"
 
@@ -108,6 +109,10 @@ void estimate_stability(SteppedBody& body) {
       points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
   body.rest_span = affine_span(rest);
   body.energy_noise = 1e-15 * body.mass * body.largest_eigenvalue * extent2;
+  if (body.mass > 0) return;
+  // Held altogether it has no mass to go by, but round-off in how it is driven, too.
+  const std::vector<Real> ones(body.particles.inverse_masses.size(), 1);
+  body.energy_noise = 1e-15 * largest_eigenvalue_bound(*body.field, rest, ones) * extent2;
 }
 
 }  // namespace penalty
