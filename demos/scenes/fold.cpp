@@ -117,20 +117,17 @@ SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
   const auto layers = std::make_shared<Layers>(body.shell());
   return {.name = "fold",
           .title = "Cloth falls folded on a ball",
-          .body = body,
-          .field = std::move(field),
-          .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
-          .positions = start == Start::rest ? folded : start_positions(folded, start, options.seed),
-          .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-          .pinned = {},
+          .bodies = alone({.mesh = body,
+                           .field = std::move(field),
+                           .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
+                           .positions = start == Start::rest ? folded : start_positions(folded, start, options.seed)}),
           .gravity = {0, -9.81, 0},
           .ground = true,
           .objects = {{.shape = Ball{ball_radius}, .pose = {.position = {0.05, ball_radius, 0.02}}}},
           .step = step_options(options, {.damping_time = damping, .drag = 0.3}),
-          .tip = {},
           .look = {.azimuth = 32, .elevation = 18, .wire = false},
-          .watch = [layers](const Positions& x, const PotentialField&, Real) { layers->see(x); },
-          .facts = [layers](const Positions&, const PotentialField&) { return layers->facts(); }};
+          .watch = [layers](const SceneState& state) { layers->see(state.x()); },
+          .facts = [layers](const SceneState&) { return layers->facts(); }};
 }
 
 }  // namespace
