@@ -11,6 +11,7 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real figure_frames_per_second = 15;
+const render::Color scenery{0.66f, 0.67f, 0.69f};
 
 using render::Frame;
 using render::Overlay;
@@ -47,10 +48,11 @@ class Stage {
     for (std::size_t b = 0; b < record.objects.size(); ++b) {
       render::Transform transform;
       transform << record.objects[b].rotation, record.objects[b].position;
-      frame.bodies.push_back({.shape = std::visit(DrawnShape(), setup_.objects[b].shape),
+      const RigidObject& object = setup_.objects[b];
+      frame.bodies.push_back({.shape = std::visit(DrawnShape(), object.shape),
                               .transform = transform,
-                              .color = render::palette(static_cast<int>(b)),
-                              .two_tone = true});
+                              .color = object.scenery ? scenery : render::palette(static_cast<int>(b)),
+                              .two_tone = !object.scenery});
     }
     return frame;
   }

@@ -43,6 +43,7 @@ class Bodies {
 
   std::vector<SoftRecord> records(Coloring coloring) const {
     std::vector<SoftRecord> records;
+    records.reserve(objects_.size());
     for (std::size_t b = 0; b < objects_.size(); ++b)
       records.push_back({positions(b).topRows<3>(),
                          coloring == Coloring::energy ? energy_densities(b) : measures_[b].vertex_strains(positions(b)),

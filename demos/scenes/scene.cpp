@@ -171,7 +171,7 @@ const Particles& Scene::particles(std::size_t body) const { return impl_->partic
 const StepReport& Scene::report(std::size_t body) const { return impl_->attached().report(*impl_->bodies[body]); }
 
 SceneState Scene::state() const {
-  SceneState state{.time = time(), .bodies = {}, .objects = objects()};
+  SceneState state{.time = time(), .objects = objects()};
   for (std::size_t b = 0; b < impl_->bodies.size(); ++b) state.bodies.push_back({particles(b), field(b)});
   return state;
 }

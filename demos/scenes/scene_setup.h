@@ -79,6 +79,9 @@ struct Elasticity {
 Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default,
                       ElasticModel default_model = ElasticModel::springs_volumes, int phases = 1);
 
+/// A body of this mesh and material, or of what the user wants, at rest at `pose`; its start shape is the user's.
+SoftObject soft_object(const SceneOptions& options, const BodyMesh& mesh, const Material& material, const Pose& pose);
+
 /// `by_default` with what the user chose. Throws std::invalid_argument.
 StepOptions step_options(const SceneOptions& options, StepOptions by_default);
 

@@ -21,9 +21,9 @@ struct SoftState {
 };
 
 struct SceneState {
-  Real time = 0;                  // [s]
-  std::vector<SoftState> bodies;  // as in the setup
-  std::vector<Pose> objects;      // likewise
+  Real time = 0;                       // [s]
+  std::vector<SoftState> bodies = {};  // as in the setup
+  std::vector<Pose> objects = {};      // likewise
 
   const PackedVectors& x(std::size_t body = 0) const { return bodies[body].particles.positions; }  // [m]
   const PotentialField& field(std::size_t body = 0) const { return bodies[body].field; }
