@@ -1,0 +1,35 @@
+// What each scene about contact claims, in both worlds, coarse. Compiled for both precisions of Bullet.
+#include <cmath>
+
+#include "scene_fixture.h"
+
+namespace penalty::demo {
+namespace {
+
+using ContactClaims = Scenes;
+
+INSTANTIATE_TEST_SUITE_P(Worlds, ContactClaims, testing::Values(WorldKind::classic, WorldKind::deformable), world_name);
+
+void run(Scene& scene, Real duration) {
+  for (int step = 0; step < std::lround(60 * duration); ++step) scene.step(1.0 / 60);
+  ASSERT_TRUE(scene.report().finite);
+}
+
+TEST_P(ContactClaims, RingsThatCollideKeepTheirMomenta) {
+  const auto scene = make("collide", {.cells = 10});
+  ASSERT_TRUE(scene->is_free());
+  const Momenta before = scene->momenta();
+  const Real energy = scene->energies().total();
+  for (int step = 0; step < 60; ++step) {
+    scene->step(1.0 / 60);
+    ASSERT_LE(scene->energies().total(), (1 + 1e-12) * energy) << "step " << step;
+  }
+  EXPECT_GT(fact(*scene, "exchanged_momentum"), 0.2) << "they have met";
+  EXPECT_EQ(fact(*scene, "crossings"), 0);
+  const Real bound = bullet_precision() == "float32" ? 1e-6 : 1e-12;
+  EXPECT_LT((scene->momenta().linear - before.linear).norm(), bound * before.linear_scale);
+  EXPECT_LT((scene->momenta().angular - before.angular).norm(), bound * before.angular_scale);
+}
+
+}  // namespace
+}  // namespace penalty::demo
