@@ -31,5 +31,16 @@ TEST_P(ContactClaims, RingsThatCollideKeepTheirMomenta) {
   EXPECT_LT((scene->momenta().angular - before.angular).norm(), bound * before.angular_scale);
 }
 
+TEST_P(ContactClaims, ThePileStandsAndComesToRest) {
+  const auto scene = make("stack", {.cells = 3});
+  run(*scene, 4);
+  EXPECT_EQ(fact(*scene, "crossings"), 0);
+  EXPECT_EQ(fact(*scene, "in_order"), 1);
+  EXPECT_LT(fact(*scene, "lean"), 0.05);
+  EXPECT_LT(fact(*scene, "residual_speed"), 0.01);
+  EXPECT_LT(scene->penetration(), margin);
+  EXPECT_GT(fact(*scene, "pile_height"), 0.85 * (3 * 0.6 + 2 * 0.2));
+}
+
 }  // namespace
 }  // namespace penalty::demo
