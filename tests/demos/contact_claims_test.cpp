@@ -42,5 +42,18 @@ TEST_P(ContactClaims, ThePileStandsAndComesToRest) {
   EXPECT_GT(fact(*scene, "pile_height"), 0.85 * (3 * 0.6 + 2 * 0.2));
 }
 
+TEST_P(ContactClaims, NothingInTheBowlIsInsideAnythingElse) {
+  const auto scene = make("bowl", {});
+  run(*scene, 2.5);
+  EXPECT_GE(fact(*scene, "soft_bodies"), 10);
+  Real highest = 0;
+  for (std::size_t b = 0; b < scene->setup().bodies.size(); ++b)
+    highest = std::max(highest, scene->particles(b).positions.row(1).mean());
+  EXPECT_LT(highest, 5) << "all have fallen";
+  EXPECT_EQ(fact(*scene, "crossings"), 0);
+  EXPECT_EQ(fact(*scene, "overlapping_pairs"), 0);
+  EXPECT_EQ(fact(*scene, "escaped"), 0);
+}
+
 }  // namespace
 }  // namespace penalty::demo
