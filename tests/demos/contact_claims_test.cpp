@@ -55,5 +55,22 @@ TEST_P(ContactClaims, NothingInTheBowlIsInsideAnythingElse) {
   EXPECT_EQ(fact(*scene, "escaped"), 0);
 }
 
+TEST_P(ContactClaims, ThePressedRingHasItsShapeAgain) {
+  const auto scene = make("press", {.cells = 14});
+  const BodyMesh& mesh = scene->setup().bodies[0].mesh;
+  const ShapeMeasure measure(mesh.vertices(), mesh.tetrahedra());
+  Real largest = 0, deepest = 0;
+  for (int step = 0; step < 5 * 60; ++step) {
+    scene->step(1.0 / 60);
+    largest = std::max(largest, measure.rest_error(scene->particles().positions));
+    deepest = std::max(deepest, scene->penetration());
+  }
+  EXPECT_GT(largest, 0.05) << "it was flat";
+  EXPECT_LT(fact(*scene, "least_height"), 0.6 * fact(*scene, "rest_height"));
+  EXPECT_LT(measure.rest_error(scene->particles().positions), 0.01);
+  EXPECT_EQ(fact(*scene, "self_crossings"), 0);
+  EXPECT_EQ(deepest, 0) << "the margin keeps it off slab and ground";
+}
+
 }  // namespace
 }  // namespace penalty::demo
