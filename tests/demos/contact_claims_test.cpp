@@ -1,5 +1,6 @@
 // What each scene about contact claims, in both worlds, coarse. Compiled for both precisions of Bullet.
 #include <cmath>
+#include <numbers>
 
 #include "scene_fixture.h"
 
@@ -53,6 +54,15 @@ TEST_P(ContactClaims, NothingInTheBowlIsInsideAnythingElse) {
   EXPECT_EQ(fact(*scene, "crossings"), 0);
   EXPECT_EQ(fact(*scene, "overlapping_pairs"), 0);
   EXPECT_EQ(fact(*scene, "escaped"), 0);
+}
+
+TEST_P(ContactClaims, FrictionHoldsOneRingAndLetsTheOtherSlide) {
+  const auto scene = make("incline", {.cells = 14});
+  run(*scene, 2.4);
+  EXPECT_GT(fact(*scene, "slid"), 2);
+  EXPECT_LT(std::abs(fact(*scene, "creep")), 2e-3);
+  const Real slope = std::numbers::pi / 9;
+  EXPECT_NEAR(fact(*scene, "acceleration"), 9.81 * (std::sin(slope) - 0.2 * std::cos(slope)), 0.02);
 }
 
 TEST_P(ContactClaims, ThePressedRingHasItsShapeAgain) {
