@@ -82,5 +82,14 @@ TEST_P(ContactClaims, ThePressedRingHasItsShapeAgain) {
   EXPECT_EQ(deepest, 0) << "the margin keeps it off slab and ground";
 }
 
+TEST_P(ContactClaims, FingersLiftTheBallWithoutSlip) {
+  const auto scene = make("hand", {.cells = 10});
+  run(*scene, 4.5);
+  EXPECT_NEAR(fact(*scene, "lifted"), fact(*scene, "lift_of_fingers"), 0.1) << "it hangs a little lower";
+  EXPECT_GT(fact(*scene, "held_vertices"), 0.8 * fact(*scene, "touched_vertices"));
+  EXPECT_GT(fact(*scene, "held_vertices"), 20);
+  EXPECT_LT(fact(*scene, "slip_mean"), 0.02);
+}
+
 }  // namespace
 }  // namespace penalty::demo
