@@ -54,9 +54,14 @@ std::vector<Figure> make_figures(const SceneEntry& entry, const SceneOptions& op
   throw UsageError(one_line(error.what()));
 }
 
-bool worse(const Recording& a, const Recording& b) {
-  if (a.finite != b.finite) return !a.finite;
-  return a.rest_error > b.rest_error;
+struct Run {
+  std::unique_ptr<Scene> scene;  // at its end
+  Recording recording;
+};
+
+bool worse(const Run& a, const Run& b) {
+  if (a.recording.finite != b.recording.finite) return !a.recording.finite;
+  return a.recording.rest_error > b.recording.rest_error;
 }
 
 /// Writes the summary to wherever it is wanted, `description` if it is wanted nowhere.
@@ -101,45 +106,45 @@ Status run(RunOptions options) {
   const int runs = std::max(options.seeds, 1);
   int recovered = 0;
   nlohmann::ordered_json each_seed = nlohmann::ordered_json::array();
-  const Recording worst = [&] {
+  const Run worst = [&] {
     Progress progress(options.scene, steps * runs);
-    const auto run_once = [&](int r) {
-      const std::unique_ptr<Scene> scene = enter_world(entry, options, body);
+    const auto run_once = [&](int r) -> Run {
+      std::unique_ptr<Scene> scene = enter_world(entry, options, body);
       Recording recording =
           record(*scene, options, steps, frames, [&](long step) { progress.advance_to(r * steps + step); });
       recovered += recording.recovered();
       each_seed.push_back(
           {{"seed", recording.seed}, {"rest_error", recording.rest_error}, {"recovered", recording.recovered()}});
       ++options.scene_options.seed;
-      return recording;
+      return {std::move(scene), std::move(recording)};
     };
-    Recording worst_so_far = run_once(0);
+    Run worst_so_far = run_once(0);
     for (int r = 1; r < runs; ++r)
-      if (Recording other = run_once(r); worse(other, worst_so_far)) worst_so_far = std::move(other);
+      if (Run other = run_once(r); worse(other, worst_so_far)) worst_so_far = std::move(other);
     return worst_so_far;
   }();
+  const Recording& recording = worst.recording;
 
-  nlohmann::ordered_json summary = summarize(worst, options, body);
+  nlohmann::ordered_json summary = summarize(recording, options, worst.scene->setup());
   if (options.seeds > 0) {
     summary["runs"] = runs;
     summary["recovered_runs"] = recovered;
     summary["each_seed"] = each_seed;
   }
-  hand_out(summary, describe(summary, worst.facts), options, summary_file);
+  hand_out(summary, describe(summary, recording.facts), options, summary_file);
   if (options.out) {
-    write_csv(*options.out / "energies.csv", worst.steps);
-    write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, worst.steps);
+    write_csv(*options.out / "energies.csv", recording.steps);
+    write_energy_plot(*options.out / "energies.svg", "Energies, scene " + options.scene, recording.steps);
   }
 
   if (draws) {
-    Progress progress("drawing", static_cast<long>(worst.frames.size()) + 1);
-    options.scene_options.seed = worst.seed;
-    const std::string remarks = draw(worst, options, entry.setup(options.scene_options, body), frames, *options.out,
+    Progress progress("drawing", static_cast<long>(recording.frames.size()) + 1);
+    const std::string remarks = draw(recording, options, worst.scene->setup(), frames, *options.out,
                                      [&](long drawn) { progress.advance_to(drawn); });
     if (!remarks.empty()) std::cerr << "penalty-demo: " << remarks << '\n';
   }
-  if (!worst.finite) {
-    std::cerr << "penalty-demo: " << worst.failure << '\n';
+  if (!recording.finite) {
+    std::cerr << "penalty-demo: " << recording.failure << '\n';
     return not_finite;
   }
   return done;

@@ -11,6 +11,7 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real figure_frames_per_second = 15;
+const render::Color scenery{0.66f, 0.67f, 0.69f};
 
 using render::Frame;
 using render::Overlay;
@@ -24,7 +25,8 @@ struct DrawnShape {
 class Stage {
  public:
   Stage(const Recording& recording, const RunOptions& options, const SceneSetup& setup)
-      : recording_(recording), options_(options), setup_(setup), triangles_(setup.body.drawn_triangles()) {
+      : recording_(recording), options_(options), setup_(setup) {
+    for (const SoftObject& body : setup.bodies) triangles_.push_back(body.mesh.drawn_triangles());
     shows_energy_ = coloring(options, setup) == Coloring::energy;
     colors_.square_root = shows_energy_;
     colors_.high = setup.look.color_high && !shows_energy_ ? *setup.look.color_high : color_range();
@@ -34,21 +36,24 @@ class Stage {
     Frame frame;
     frame.colors = colors_;
     if (setup_.ground) frame.ground = 0.0;
-    render::SoftSurface surface;
-    surface.vertices = setup_.body.drawn(record.positions);
-    surface.triangles = record.triangles.empty() ? triangles_ : record.triangles;
-    surface.values = drawn_values(record.values);
-    surface.wire = setup_.look.wire && !setup_.body.surface;
-    frame.surfaces.push_back(std::move(surface));
+    for (std::size_t b = 0; b < record.bodies.size(); ++b) {
+      const SoftRecord& body = record.bodies[b];
+      const BodyMesh& mesh = setup_.bodies[b].mesh;
+      frame.surfaces.push_back({.vertices = mesh.drawn(body.positions),
+                                .triangles = body.triangles.empty() ? triangles_[b] : body.triangles,
+                                .values = drawn_values(mesh, body.values),
+                                .wire = setup_.look.wire && !mesh.surface});
+      for (int i : setup_.bodies[b].pinned) frame.markers.push_back({.position = body.positions.col(i)});
+    }
     for (std::size_t b = 0; b < record.objects.size(); ++b) {
       render::Transform transform;
       transform << record.objects[b].rotation, record.objects[b].position;
-      frame.bodies.push_back({.shape = std::visit(DrawnShape(), setup_.objects[b].shape),
+      const RigidObject& object = setup_.objects[b];
+      frame.bodies.push_back({.shape = std::visit(DrawnShape(), object.shape),
                               .transform = transform,
-                              .color = render::palette(static_cast<int>(b)),
-                              .two_tone = true});
+                              .color = object.scenery ? scenery : render::palette(static_cast<int>(b)),
+                              .two_tone = !object.scenery});
     }
-    for (int i : setup_.pinned) frame.markers.push_back({.position = record.positions.col(i)});
     return frame;
   }
 
@@ -59,33 +64,42 @@ class Stage {
       if (restart.time < record.time + 1e-9) overlay.title = setup_.title + ": " + restart.name;
     char time[32];
     std::snprintf(time, sizeof time, "t = %.2f s", record.time);
-    overlay.subtitle = {time,
-                        setup_.body.is_shell() ? std::to_string(triangles_.size()) + " triangles"
-                                               : std::to_string(setup_.body.solid().tetrahedra.size()) + " tetrahedra",
+    overlay.subtitle = {time, num_elements(),
                         std::string(name_of(options_.world)) + " world, " + std::string(bullet_precision())};
-    overlay.color_bar = shows_energy_ ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() +
-                                                             (setup_.body.is_shell() ? "/m²]" : "/m³]"),
-                                                         unit()}
-                                      : render::ColorBar{"mean |C|\nof lengths", 1};
+    overlay.color_bar =
+        shows_energy_
+            ? render::ColorBar{std::string("strain energy\ndensity [") + unit_name() + (is_shell() ? "/m²]" : "/m³]"),
+                               unit()}
+            : render::ColorBar{"mean |C|\nof lengths", 1};
     overlay.inset = curves(record.time);
     return overlay;
   }
 
  private:
-  Eigen::VectorXd drawn_values(const Eigen::VectorXd& values) const {
-    if (!setup_.body.surface) return values;
-    const EmbeddedSurface& embedded = *setup_.body.surface;
+  bool is_shell() const { return setup_.bodies.front().mesh.is_shell(); }
+
+  std::string num_elements() const {
+    std::size_t count = 0;
+    for (std::size_t b = 0; b < triangles_.size(); ++b)
+      count += is_shell() ? triangles_[b].size() : setup_.bodies[b].mesh.tetrahedra().size();
+    return std::to_string(count) + (is_shell() ? " triangles" : " tetrahedra");
+  }
+
+  static Eigen::VectorXd drawn_values(const BodyMesh& mesh, const Eigen::VectorXd& values) {
+    if (!mesh.surface) return values;
+    const EmbeddedSurface& embedded = *mesh.surface;
     Eigen::VectorXd drawn = Eigen::VectorXd::Zero(embedded.weights.cols());
     for (Eigen::Index v = 0; v < drawn.size(); ++v)
       for (int k = 0; k < 4; ++k) drawn[v] += embedded.weights(k, v) * values[embedded.stencils[v][k]];
     return drawn.cwiseMax(0);
   }
 
-  /// The highest value that most of the body reaches at some time: single vertices would leave the rest in the dark.
+  /// The highest value that most of the vertices reach at some time: single ones would leave the rest in the dark.
   double color_range() const {
     double high = 0;
     for (const FrameRecord& frame : recording_.frames) {
-      std::vector<double> values(frame.values.begin(), frame.values.end());
+      std::vector<double> values;
+      for (const SoftRecord& body : frame.bodies) values.insert(values.end(), body.values.begin(), body.values.end());
       const auto rank = values.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(values.size() - 1));
       std::nth_element(values.begin(), rank, values.end());
       if (std::isfinite(*rank)) high = std::max(high, *rank);
@@ -131,7 +145,7 @@ class Stage {
   const Recording& recording_;
   const RunOptions& options_;
   const SceneSetup& setup_;
-  std::vector<Triangle> triangles_;
+  std::vector<std::vector<Triangle>> triangles_;  // of each body
   render::ColorScale colors_;
   bool shows_energy_ = true;
 };
@@ -171,9 +185,11 @@ std::string draw(const Recording& recording, const RunOptions& options, const Sc
   render::Renderer renderer({.backend = options.backend, .quality = finest ? render::Quality::video : options.quality});
   render::Bounds bounds;
   if (setup.look.reach) {
-    const Eigen::Matrix3Xd& rest = setup.body.vertices();
-    const Vector3 low = rest.rowwise().minCoeff(), high = rest.rowwise().maxCoeff();
-    bounds.add(Vector3((low + high) / 2), *setup.look.reach * (high - low).norm() / 2);
+    for (const SoftObject& body : setup.bodies) {
+      const Eigen::Matrix3Xd& rest = body.mesh.vertices();
+      const Vector3 low = rest.rowwise().minCoeff(), high = rest.rowwise().maxCoeff();
+      bounds.add(Vector3((low + high) / 2), *setup.look.reach * (high - low).norm() / 2);
+    }
   } else {
     for (const FrameRecord& record : recording.frames) bounds.add(bounds_of(stage.frame(record)));
   }

@@ -18,23 +18,69 @@ Real thread_milliseconds() {
   return 1e3 * static_cast<Real>(now.tv_sec) + 1e-6 * static_cast<Real>(now.tv_nsec);
 }
 
-/// Elastic energy over rest volume [J/m³], of a shell over rest area [J/m²]; 0 where a vertex stands for none.
-Eigen::VectorXd energy_densities(const Scene& scene, const Eigen::VectorXd& shares) {
-  const Eigen::VectorXd energies = particle_energies(scene.field(), scene.particles().positions);
-  return (shares.array() > 0).select(energies.array() / shares.array(), 0);
-}
+/// The soft bodies of a scene, and what they are measured by.
+class Bodies {
+ public:
+  explicit Bodies(const Scene& scene) : scene_(scene), objects_(scene.setup().bodies) {
+    for (const SoftObject& object : objects_) {
+      measures_.emplace_back(object.mesh.vertices(), object.mesh.edges(), object.mesh.tetrahedra());
+      shares_.push_back(object.mesh.vertex_shares());
+    }
+  }
+
+  ShapeErrors errors() const {
+    ShapeErrors sum;
+    for (std::size_t b = 0; b < measures_.size(); ++b) sum += measures_[b].errors(positions(b));
+    return sum;
+  }
+
+  Real rest_error() const {
+    Real largest = 0;
+    for (std::size_t b = 0; b < measures_.size(); ++b)
+      if (const Real error = measures_[b].rest_error(positions(b)); !(error <= largest)) largest = error;
+    return largest;
+  }
+
+  std::vector<SoftRecord> records(Coloring coloring) const {
+    std::vector<SoftRecord> records;
+    records.reserve(objects_.size());
+    for (std::size_t b = 0; b < objects_.size(); ++b)
+      records.push_back({positions(b).topRows<3>(),
+                         coloring == Coloring::energy ? energy_densities(b) : measures_[b].vertex_strains(positions(b)),
+                         unbroken_triangles(objects_[b].mesh, scene_.field(b))});
+    return records;
+  }
+
+ private:
+  const PackedVectors& positions(std::size_t body) const { return scene_.particles(body).positions; }
+
+  /// Elastic energy over rest volume [J/m³], of a shell over rest area [J/m²]; 0 where a vertex stands for none.
+  Eigen::VectorXd energy_densities(std::size_t body) const {
+    const Eigen::VectorXd energies = particle_energies(scene_.field(body), positions(body));
+    return (shares_[body].array() > 0).select(energies.array() / shares_[body].array(), 0);
+  }
+
+  const Scene& scene_;
+  const std::vector<SoftObject>& objects_;
+  std::vector<ShapeMeasure> measures_;
+  std::vector<Eigen::VectorXd> shares_;  // of the vertices, in volume or area
+};
 
 std::string failure_message(const Scene& scene, long step, Real time) {
   std::ostringstream text;
-  const int particle = scene.report().first_bad_particle;
   text << "step " << step << " (t = " << readable(time) << " s) is not finite";
-  if (particle >= 0) {
+  const std::vector<SoftObject>& bodies = scene.setup().bodies;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const int particle = scene.report(b).first_bad_particle;
+    if (particle < 0) continue;
     text << " at particle " << particle;
-    const std::span<const Tetrahedron> tetrahedra = scene.setup().body.tetrahedra();
+    if (bodies.size() > 1) text << " of body " << b;
+    const std::span<const Tetrahedron> tetrahedra = bodies[b].mesh.tetrahedra();
     const auto with = std::find_if(tetrahedra.begin(), tetrahedra.end(), [particle](const Tetrahedron& t) {
       return std::find(t.begin(), t.end(), particle) != t.end();
     });
     if (with != tetrahedra.end()) text << ", first of all in tetrahedron " << with - tetrahedra.begin();
+    break;
   }
   return text.str();
 }
@@ -65,9 +111,7 @@ Coloring coloring(const RunOptions& options, const SceneSetup& setup) {
 Recording record(Scene& scene, const RunOptions& options, long steps, const FramePlan& frames,
                  const std::function<void(long)>& progress) {
   const Real dt = 1 / options.rate;
-  const BodyMesh& body = scene.setup().body;
-  const ShapeMeasure measure(body.vertices(), body.edges(), body.tetrahedra());
-  const Eigen::VectorXd shares = body.vertex_shares();
+  const Bodies bodies(scene);
   Recording recording;
   recording.seed = options.scene_options.seed;
 
@@ -76,10 +120,10 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
   Real next_frame = 0;
   const auto look = [&](long step, Real milliseconds) {
     const Real time = static_cast<Real>(step) * dt;
-    const StepReport& report = scene.report();
+    const StepReport report = scene.report();
     StepRecord record{.time = time,
                       .energies = scene.energies(),
-                      .errors = measure.errors(scene.particles().positions),
+                      .errors = bodies.errors(),
                       .penetration = scene.penetration(),
                       .contact_depth = report.contact_depth,
                       .implicit = report.integrator == Integrator::implicit_step,
@@ -97,11 +141,7 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
     linear_scale = std::max(linear_scale, now.linear_scale);
     angular_scale = std::max(angular_scale, now.angular_scale);
     if (frames.interval > 0 && (time >= next_frame - dt / 4)) {
-      recording.frames.push_back({time, scene.particles().positions.topRows<3>(),
-                                  coloring(options, scene.setup()) == Coloring::energy
-                                      ? energy_densities(scene, shares)
-                                      : measure.vertex_strains(scene.particles().positions),
-                                  scene.objects(), unbroken_triangles(body, scene.field())});
+      recording.frames.push_back({time, bodies.records(coloring(options, scene.setup())), scene.objects()});
       next_frame += frames.interval;
     }
   };
@@ -121,7 +161,7 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
   }
 
   recording.facts = scene.facts();
-  recording.rest_error = measure.rest_error(scene.particles().positions);
+  recording.rest_error = bodies.rest_error();
   if (scene.is_free()) {
     recording.linear_drift = linear_scale > 0 ? linear_drift / linear_scale : 0;
     recording.angular_drift = angular_scale > 0 ? angular_drift / angular_scale : 0;

@@ -21,23 +21,28 @@ struct StepRecord {
   Real milliseconds = 0;             // CPU time of the world step
   std::optional<Real> tip_drop;      // [m]
   std::vector<LedgerEntry> batches;  // in the order of the field
-  EnergyFlows flows;                 // of the soft body, since the start
+  EnergyFlows flows;                 // of the soft bodies, since the start
+};
+
+/// What a picture needs of a soft body.
+struct SoftRecord {
+  Eigen::Matrix3Xd positions;       // of the simulated vertices [m]
+  Eigen::VectorXd values;           // what the colours show, one a simulated vertex
+  std::vector<Triangle> triangles;  // that are left to draw; empty: all of them
 };
 
 /// What a picture needs.
 struct FrameRecord {
   Real time = 0;
-  Eigen::Matrix3Xd positions;  // of the simulated vertices [m]
-  Eigen::VectorXd values;      // what the colours show, one a simulated vertex
+  std::vector<SoftRecord> bodies;
   std::vector<Pose> objects;
-  std::vector<Triangle> triangles;  // that are left to draw; empty: all of them
 };
 
 struct Recording {
   std::uint32_t seed = 0;
-  std::vector<StepRecord> steps;    // the start first
-  std::vector<FrameRecord> frames;  // the start first; empty unless asked for
-  Real rest_error = 0;
+  std::vector<StepRecord> steps;                    // the start first
+  std::vector<FrameRecord> frames;                  // the start first; empty unless asked for
+  Real rest_error = 0;                              // of the body where it is largest
   std::vector<Fact> facts;                          // of this scene alone, at the end
   std::optional<Real> linear_drift, angular_drift;  // relative; empty where something from outside acts
   bool finite = true;
@@ -45,7 +50,7 @@ struct Recording {
   bool recovered() const { return finite && rest_error < 1e-2; }
 };
 
-/// |E - (E_start + received - lost)| over the largest E of the run, E the elastic and kinetic energy of the soft body
+/// |E - (E_start + received - lost)| over the largest E of the run, E the elastic and kinetic energy of the soft bodies
 /// at the end: what the energy ledger leaves unexplained. 0 where there is no energy at all.
 Real ledger_residual(const std::vector<StepRecord>& steps);
 

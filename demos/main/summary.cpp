@@ -43,6 +43,23 @@ Json energy_summary(const std::vector<Real>& energies) {
           {"final", number(energies.back())}};
 }
 
+/// Of all bodies together; the source is that of the first.
+Json mesh_summary(const std::vector<SoftObject>& bodies) {
+  Eigen::Index vertices = 0;
+  std::size_t tetrahedra = 0, triangles = 0, edges = 0;
+  for (const SoftObject& body : bodies) {
+    vertices += body.mesh.vertices().cols();
+    tetrahedra += body.mesh.tetrahedra().size();
+    triangles += body.mesh.drawn_triangles().size();
+    edges += body.mesh.edges().size();
+  }
+  return {{"source", bodies.front().mesh.source()},
+          {"vertices", vertices},
+          {"tetrahedra", tetrahedra},
+          {"triangles", triangles},
+          {"edges", edges}};
+}
+
 /// What each batch holds at the end, and what came and went in the course of the run.
 Json ledger_summary(const std::vector<StepRecord>& steps) {
   Json batches = Json::array(), flows;
@@ -57,7 +74,7 @@ Json ledger_summary(const std::vector<StepRecord>& steps) {
   return {{"batches", batches}, {"flows", flows}, {"residual", number(ledger_residual(steps))}};
 }
 
-/// The first moment from which on the soft body keeps less than a hundredth of its largest kinetic energy.
+/// The first moment from which on the soft bodies keep less than a hundredth of their largest kinetic energy.
 std::optional<Real> settling_time(const std::vector<StepRecord>& steps) {
   const Real limit = 0.01 * largest(column(steps, [](const auto& s) { return s.energies.kinetic; }));
   auto first = steps.end();
@@ -93,7 +110,7 @@ std::string integrator_used(const std::vector<StepRecord>& taken) {
 
 }  // namespace
 
-Json summarize(const Recording& recording, const RunOptions& options, const BodyMesh& body) {
+Json summarize(const Recording& recording, const RunOptions& options, const SceneSetup& setup) {
   const std::vector<StepRecord>& steps = recording.steps;
   const std::vector<StepRecord> taken(steps.begin() + 1, steps.end());
   const auto over_steps = [&taken](auto get) { return taken.empty() ? std::vector<Real>{0} : column(taken, get); };
@@ -112,11 +129,7 @@ Json summarize(const Recording& recording, const RunOptions& options, const Body
   json["world"] = name_of(options.world);
   json["integrator"] = integrator_used(taken);
   json["precision"] = bullet_precision();
-  json["mesh"] = {{"source", body.source()},
-                  {"vertices", body.vertices().cols()},
-                  {"tetrahedra", body.tetrahedra().size()},
-                  {"triangles", body.drawn_triangles().size()},
-                  {"edges", body.edges().size()}};
+  json["mesh"] = mesh_summary(setup.bodies);
   json["start"] = options.scene_options.start ? Json(name_of(*options.scene_options.start)) : Json(nullptr);
   json["seed"] = recording.seed;
   json["dt"] = 1 / options.rate;

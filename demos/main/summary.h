@@ -7,7 +7,7 @@
 namespace penalty::demo {
 
 /// One object; numbers that are not finite, and what has no meaning in the scene, are null.
-nlohmann::ordered_json summarize(const Recording& recording, const RunOptions& options, const BodyMesh& body);
+nlohmann::ordered_json summarize(const Recording& recording, const RunOptions& options, const SceneSetup& setup);
 
 /// The same keys for a scene that is a figure; all that has to do with a run is null.
 nlohmann::ordered_json summarize(const std::vector<Figure>& figures, const RunOptions& options);

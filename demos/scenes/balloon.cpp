@@ -73,22 +73,20 @@ SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
   return {
       .name = "balloon",
       .title = "A balloon is blown up",
-      .body = body,
-      .field = std::move(field),
-      .mass = rubber.density * rubber.thickness * area(body.shell()),
-      .positions = positions,
-      .velocities = Eigen::Matrix3Xd::Zero(3, positions.cols()),
-      .pinned = {static_cast<int>(nozzle)},
-      .gravity = {0, 0, 0},
+      .bodies =
+          alone({.mesh = body,
+                 .field = std::move(field),
+                 .mass = rubber.density * rubber.thickness * area(body.shell()),
+                 .positions = positions,
+                 .pinned = {static_cast<int>(nozzle)},
+                 .control = [](PotentialField& elements,
+                               Real time) { elements.find<EnclosedVolume>()->set_targets(wanted_volume(time)); }}),
       .ground = true,
-      .objects = {},
       .step = step_options(options, {.damping_time = damping, .drag = 0.3, .safety = safety, .contact_safety = safety}),
-      .tip = {},
       .look = {.azimuth = 28, .elevation = 16},
-      .control = [](PotentialField& elements,
-                    Real time) { elements.find<EnclosedVolume>()->set_targets(wanted_volume(time)); },
-      .facts = [rest_area = area(body.shell())](
-                   const Positions& x, const PotentialField& elements) { return facts(x, elements, rest_area); }};
+      .facts = [rest_area = area(body.shell())](const SceneState& state) {
+        return facts(state.x(), state.field(), rest_area);
+      }};
 }
 
 }  // namespace

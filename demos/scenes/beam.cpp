@@ -55,17 +55,14 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
 
   return {.name = "beam",
           .title = "Clamped beam",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = positions,
-          .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-          .pinned = pinned,
+          .bodies = alone({.mesh = body,
+                           .field = std::move(elastic.field),
+                           .mass = elastic.mass,
+                           .positions = positions,
+                           .pinned = pinned,
+                           .tip = tip}),
           .gravity = {0, -9.81, 0},
-          .ground = false,
-          .objects = {},
           .step = step_options(options, {.drag = drag}),
-          .tip = tip,
           .look = {.azimuth = 24, .elevation = 12, .still_time = 0.5}};  // when it hangs deepest
 }
 

@@ -59,20 +59,15 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
     balls.push_back({.shape = Ball{ball_radius}, .pose = {.position = {0.12, height + fall, 0.08}}, .mass = ball_mass});
   return {.name = "cloth",
           .title = "Cloth catches a ball",
-          .body = body,
-          .field = std::move(field),
-          .mass = mass,
-          .positions = positions,
-          .velocities = Eigen::Matrix3Xd::Zero(3, num_vertices),
-          .pinned = corners,
+          .bodies =
+              alone({.mesh = body, .field = std::move(field), .mass = mass, .positions = positions, .pinned = corners}),
           .gravity = {0, -9.81, 0},
           .ground = true,
           .objects = balls,
           .step = step_options(options, {.damping_time = damping, .drag = 0.3}),
-          .tip = {},
           .look = {.azimuth = 24, .elevation = 22, .still_time = 1.2},
-          .facts = [](const Positions& x, const PotentialField&) -> std::vector<Fact> {
-            return {{"sag", height - x.row(1).minCoeff()}};
+          .facts = [](const SceneState& state) -> std::vector<Fact> {
+            return {{"sag", height - state.x().row(1).minCoeff()}};
           }};
 }
 

@@ -48,20 +48,15 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
   Eigen::Matrix3Xd positions = start_positions(body.vertices(), options.start.value_or(Start::rest), options.seed);
   positions.row(1).array() += height - body.drawn(positions).row(1).minCoeff();
 
-  return {.name = "drop",
-          .title = "Drop among rigid balls",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = positions,
-          .velocities = Eigen::Matrix3Xd::Zero(3, positions.cols()),
-          .pinned = {},
-          .gravity = {0, -9.81, 0},
-          .ground = true,
-          .objects = scattered(count, ball_density * elastic.mass / volume(body.solid()), options.seed),
-          .step = step_options(options, {.damping_time = jelly_damping}),
-          .tip = {},
-          .look = {.still_time = 0.76}};  // on the ground, flattest
+  return {
+      .name = "drop",
+      .title = "Drop among rigid balls",
+      .bodies = alone({.mesh = body, .field = std::move(elastic.field), .mass = elastic.mass, .positions = positions}),
+      .gravity = {0, -9.81, 0},
+      .ground = true,
+      .objects = scattered(count, ball_density * elastic.mass / volume(body.solid()), options.seed),
+      .step = step_options(options, {.damping_time = jelly_damping}),
+      .look = {.still_time = 0.76}};  // on the ground, flattest
 }
 
 }  // namespace

@@ -4,14 +4,9 @@
 #include <vector>
 
 #include "render/picture.h"
+#include "scenes/scene_state.h"
 
 namespace penalty::demo {
-
-/// A measured number that the summary gives under this name.
-struct Fact {
-  std::string name;
-  double value;
-};
 
 struct Figure {
   std::string name = {};     // of the file

@@ -27,17 +27,12 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
   }
   return {.name = "flight",
           .title = "Free flight",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = positions,
-          .velocities = velocities,
-          .pinned = {},
-          .gravity = {0, 0, 0},
-          .ground = false,
-          .objects = {},
+          .bodies = alone({.mesh = body,
+                           .field = std::move(elastic.field),
+                           .mass = elastic.mass,
+                           .positions = positions,
+                           .velocities = velocities}),
           .step = step_options(options, {.damping_time = hard ? hard_damping : 0, .safety = safety}),
-          .tip = {},
           .look = {.azimuth = 20, .elevation = 32}};
 }
 

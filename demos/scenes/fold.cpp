@@ -4,9 +4,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "penalty/contact/box_tree.h"
-#include "penalty/contact/closest_points.h"
 #include "penalty/mesh/surface_builders.h"
+#include "scenes/drawn_surface.h"
 #include "scenes/scene_setup.h"
 #include "scenes/shell.h"
 #include "scenes/start_shapes.h"
@@ -42,69 +41,6 @@ Eigen::Matrix3Xd folded_over(const Eigen::Matrix3Xd& flat) {
   return x;
 }
 
-/// What the claim of the scene is measured by.
-class Layers {
- public:
-  explicit Layers(const TriangleSurface& sheet) : sheet_(sheet), edges_(edges_of(std::span(sheet.triangles))) {
-    Real sum = 0;
-    for (const auto& [i, j] : edges_) sum += (sheet.vertices.col(i) - sheet.vertices.col(j)).norm();
-    kept_ = std::min(margin, kept_share * sum / static_cast<Real>(edges_.size()));
-    const PackedVectors start = pack(sheet.vertices);
-    std::vector<Box> boxes;
-    boxes.reserve(sheet.triangles.size());
-    for (const Triangle& t : sheet.triangles) boxes.push_back(box_of(start, t));
-    tree_ = BoxTree(boxes);
-  }
-
-  void see(const Positions& x) {
-    tree_.refit([&](int t) { return box_of(x, sheet_.triangles[t]); });
-    const auto at = [&](int i) { return Vector3(x.col(i).head<3>()); };
-    for (const Edge& edge : edges_)
-      tree_.visit(box_of(x, edge), 0, [&](int k) {
-        const auto& [a, b, c] = sheet_.triangles[k];
-        for (const int i : edge)
-          if (i == a || i == b || i == c) return;
-        crossings_ += pierces(at(edge[0]), at(edge[1]), at(a), at(b), at(c));
-      });
-    for (int i = 0; i < x.cols(); ++i) {
-      Box box;
-      box.add(at(i));
-      tree_.visit(box, kept_, [&](int k) {
-        const auto& [a, b, c] = sheet_.triangles[k];
-        if (i == a || i == b || i == c) return;
-        least_ = std::min(least_, closest_points_of_triangle(at(i), at(a), at(b), at(c)).difference.norm());
-      });
-    }
-  }
-
-  std::vector<Fact> facts() const {
-    return {{"self_crossings", static_cast<Real>(crossings_)},
-            {"kept_distance", kept_},
-            {"least_distance", std::min(least_, kept_)}};
-  }
-
- private:
-  static Box box_of(const Positions& x, std::span<const int> corners) {
-    Box box;
-    for (const int i : corners) box.add(x.col(i).head<3>());
-    return box;
-  }
-  static bool pierces(const Vector3& p, const Vector3& q, const Vector3& a, const Vector3& b, const Vector3& c) {
-    const auto volume = [](const Vector3& u, const Vector3& v, const Vector3& w) { return u.cross(v).dot(w); };
-    const Real from = volume(b - a, c - a, p - a), to = volume(b - a, c - a, q - a);
-    if (!(from * to < 0)) return false;
-    const Vector3 d = q - p;
-    const Real u = volume(d, a - p, b - p), v = volume(d, b - p, c - p), w = volume(d, c - p, a - p);
-    return (u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0);
-  }
-
-  TriangleSurface sheet_;
-  std::vector<Edge> edges_;
-  BoxTree tree_;
-  Real kept_ = 0, least_ = std::numeric_limits<Real>::infinity();
-  long crossings_ = 0;
-};
-
 SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
   if (options.poisson) throw std::invalid_argument("--poisson does not apply to fold: springs in a plane have 1/3");
   const Eigen::Matrix3Xd& rest = body.vertices();
@@ -114,23 +50,28 @@ SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
   if (options.stiffness) field.add<Length>(body.edges(), *options.stiffness);
   const Start start = options.start.value_or(Start::rest);
   const Eigen::Matrix3Xd folded = folded_over(rest);
-  const auto layers = std::make_shared<Layers>(body.shell());
+  const std::vector<Edge> edges = body.edges();
+  Real length_of_all = 0;
+  for (const auto& [i, j] : edges) length_of_all += (rest.col(i) - rest.col(j)).norm();
+  const Real kept = std::min(margin, kept_share * length_of_all / static_cast<Real>(edges.size()));
+  const auto layers = std::make_shared<SurfaceWatch>(std::vector<BodyMesh>{body}, kept);
   return {.name = "fold",
           .title = "Cloth falls folded on a ball",
-          .body = body,
-          .field = std::move(field),
-          .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
-          .positions = start == Start::rest ? folded : start_positions(folded, start, options.seed),
-          .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-          .pinned = {},
+          .bodies = alone({.mesh = body,
+                           .field = std::move(field),
+                           .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
+                           .positions = start == Start::rest ? folded : start_positions(folded, start, options.seed)}),
           .gravity = {0, -9.81, 0},
           .ground = true,
           .objects = {{.shape = Ball{ball_radius}, .pose = {.position = {0.05, ball_radius, 0.02}}}},
           .step = step_options(options, {.damping_time = damping, .drag = 0.3}),
-          .tip = {},
           .look = {.azimuth = 32, .elevation = 18, .wire = false},
-          .watch = [layers](const Positions& x, const PotentialField&, Real) { layers->see(x); },
-          .facts = [layers](const Positions&, const PotentialField&) { return layers->facts(); }};
+          .watch = [layers](const SceneState& state) { layers->see(state); },
+          .facts = [layers, kept](const SceneState&) -> std::vector<Fact> {
+            return {{"self_crossings", static_cast<double>(layers->self_crossings())},
+                    {"kept_distance", kept},
+                    {"least_distance", layers->least_distance()}};
+          }};
 }
 
 }  // namespace

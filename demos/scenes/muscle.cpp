@@ -60,28 +60,24 @@ SceneSetup muscle(const SceneOptions& options, const BodyMesh& body) {
   const Real start = positions.row(0).mean();
   return {.name = "muscle",
           .title = "A worm crawls",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = positions,
-          .velocities = Eigen::Matrix3Xd::Zero(3, positions.cols()),
-          .pinned = {},
+          .bodies = alone({.mesh = body,
+                           .field = std::move(elastic.field),
+                           .mass = elastic.mass,
+                           .positions = positions,
+                           .control =
+                               [middles](PotentialField& field, Real time) {
+                                 ElementBatch& muscle = *field.find("muscle");
+                                 for (std::size_t e = 0; e < middles->size(); ++e)
+                                   muscle.set_target(static_cast<int>(e), wanted_strain((*middles)[e], time));
+                               },
+                           .control_start = wakes}),
           .gravity = {0, -9.81, 0},
           .ground = true,
-          .objects = {},
           .step = step_options(options, {.damping_time = damping, .contact_safety = contact_safety}),
-          .tip = {},
           .look = {.azimuth = 24, .elevation = 14},
-          .control =
-              [middles](PotentialField& field, Real time) {
-                ElementBatch& muscle = *field.find("muscle");
-                for (std::size_t e = 0; e < middles->size(); ++e)
-                  muscle.set_target(static_cast<int>(e), wanted_strain((*middles)[e], time));
-              },
-          .control_start = wakes,
           .sleeps = true,
-          .facts = [start](const Positions& x, const PotentialField&) -> std::vector<Fact> {
-            return {{"crawled", x.row(0).mean() - start}};
+          .facts = [start](const SceneState& state) -> std::vector<Fact> {
+            return {{"crawled", state.x().row(0).mean() - start}};
           }};
 }
 

@@ -91,12 +91,8 @@ SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
   const auto law = std::make_shared<YieldLaw>();
   return {.name = "plastic",
           .title = "A dent that stays",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = body.vertices(),
-          .velocities = Eigen::Matrix3Xd::Zero(3, body.vertices().cols()),
-          .pinned = {},
+          .bodies = alone(
+              {.mesh = body, .field = std::move(elastic.field), .mass = elastic.mass, .positions = body.vertices()}),
           .gravity = {0, -9.81, 0},
           .ground = true,
           .objects = {{.shape = Ball{ball_radius},
@@ -105,10 +101,9 @@ SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
                              return Pose{.position = {0, clearance + height + ball_radius + ball_height(time), 0}};
                            }}},
           .step = step_options(options, {.damping_time = damping}),
-          .tip = {},
           .look = {.azimuth = 28, .elevation = 30},
-          .watch = [law](const Positions& x, const PotentialField& field, Real) { law->see(x, *field.find<Length>()); },
-          .facts = [law](const Positions& x, const PotentialField& field) { return facts(x, field, *law); }};
+          .watch = [law](const SceneState& state) { law->see(state.x(), *state.field().find<Length>()); },
+          .facts = [law](const SceneState& state) { return facts(state.x(), state.field(), *law); }};
 }
 
 }  // namespace

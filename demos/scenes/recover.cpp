@@ -41,17 +41,11 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
   SceneSetup setup{
       .name = "recover",
       .title = options.start ? "Recovery: " + std::string(name_of(*options.start)) : "Recovery",
-      .body = body,
-      .field = std::move(elastic.field),
-      .mass = elastic.mass,
-      .positions = start_positions(rest, options.start.value_or(sequence[0]), options.seed),
-      .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-      .pinned = {},
-      .gravity = {0, 0, 0},
-      .ground = false,
-      .objects = {},
+      .bodies = alone({.mesh = body,
+                       .field = std::move(elastic.field),
+                       .mass = elastic.mass,
+                       .positions = start_positions(rest, options.start.value_or(sequence[0]), options.seed)}),
       .step = step_options(options, {.integrator = Integrator::implicit_step, .damping_time = damping}),
-      .tip = {},
       .look = {.azimuth = 20, .elevation = 18, .still_time = 0.13, .strain = true, .color_high = 1, .reach = 0.85}};
   if (options.start) return setup;
 
@@ -60,10 +54,10 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
     setup.restarts.push_back({static_cast<Real>(k) * interval, std::string(name_of(sequence[k])),
                               start_positions(rest, sequence[k], seed++)});
   const auto tally = std::make_shared<Tally>(Tally{ShapeMeasure(rest, body.edges(), body.tetrahedra())});
-  setup.watch = [tally](const Positions& x, const PotentialField&, Real time) {
-    if (time > static_cast<Real>(tally->starts + 1) * interval - 1e-6) tally->count(x);
+  setup.watch = [tally](const SceneState& state) {
+    if (state.time > static_cast<Real>(tally->starts + 1) * interval - 1e-6) tally->count(state.x());
   };
-  setup.facts = [tally](const Positions&, const PotentialField&) {
+  setup.facts = [tally](const SceneState&) {
     return std::vector<Fact>{{"starts", static_cast<double>(tally->starts)},
                              {"recovered_starts", static_cast<double>(tally->recovered)},
                              {"worst_rest_error", tally->worst}};

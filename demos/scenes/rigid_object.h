@@ -1,4 +1,4 @@
-// What a scene has besides its soft body: balls and boxes, free or moved along a path.
+// What a scene has besides its soft bodies: balls and boxes, free or moved along a path.
 #pragma once
 #include <functional>
 #include <variant>
@@ -16,8 +16,10 @@ struct Block {
 
 struct RigidObject {
   std::variant<Ball, Block> shape;
-  Pose pose = {};  // at the start
-  Real mass = 0;   // [kg]; 0: it stands still, or follows `path`
+  Pose pose = {};         // at the start
+  Real mass = 0;          // [kg]; 0: it stands still, or follows `path`
+  float friction = 0.7f;  // Coulomb coefficient, multiplied with that of what it touches
+  bool scenery = false;   // drawn in grey: the stage, not a player
   /// Where it is at a time [s], whatever it meets; empty: left to its mass. pose is then path(0).
   std::function<Pose(Real time)> path = {};
   bool pushes_back() const { return mass > 0 && !path; }

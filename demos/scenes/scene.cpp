@@ -48,9 +48,9 @@ struct Scene::Impl {
   BulletWorld world;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;  // the objects, then the ground
-  std::unique_ptr<btSoftBody> body;
-  std::vector<WeightedPoint> contact_points;
-  Real tip_start = 0, time = 0;
+  std::vector<std::unique_ptr<btSoftBody>> bodies;
+  std::vector<std::vector<WeightedPoint>> contact_points;  // of each body
+  Real time = 0;
   std::size_t restarts_done = 0;
   Real time_asleep = 0;  // [s]
   int wakings = 0;
@@ -68,12 +68,14 @@ struct Scene::Impl {
     if (setup.ground)
       add_rigid({.shape = Block{{ground_half_width, ground_half_height, ground_half_width}},
                  .pose = {.position = {0, -ground_half_height, 0}}});
-    add_soft();
+    for (SoftObject& object : setup.bodies) add_soft(object);
   }
 
   ~Impl() {
-    world.attached().detach(*body);
-    world.remove(*body);
+    for (const auto& body : bodies) {
+      world.attached().detach(*body);
+      world.remove(*body);
+    }
     for (const auto& rigid : rigid_bodies) world.world().removeRigidBody(rigid.get());
   }
 
@@ -90,7 +92,7 @@ struct Scene::Impl {
     btRigidBody::btRigidBodyConstructionInfo info(static_cast<btScalar>(mass), nullptr, shape.get(),
                                                   to_bullet(mass > 0 ? inertia(object) : Vector3::Zero()));
     info.m_startWorldTransform = to_bullet(object.path ? object.path(0) : object.pose);
-    info.m_friction = 0.7f;
+    info.m_friction = object.friction;
     info.m_rollingFriction = 0.05f;
     auto body_of_shape = std::make_unique<btRigidBody>(info);
     if (object.path) {
@@ -102,48 +104,41 @@ struct Scene::Impl {
     shapes.push_back(std::move(shape));
   }
 
-  void add_soft() {
-    SoftBodyOptions options;
-    options.mass = setup.mass;
-    options.pinned = setup.pinned;
-    options.friction = 0.7;
-    auto started = setup.body.mesh;
-    body = std::visit(
+  void add_soft(SoftObject& object) {
+    const SoftBodyOptions options{.mass = object.mass, .pinned = object.pinned, .friction = object.friction};
+    auto started = object.mesh.mesh;
+    std::unique_ptr<btSoftBody> body = std::visit(
         [&](auto& mesh) {
-          mesh.vertices = setup.positions;
+          mesh.vertices = object.positions;
           return make_soft_body(world.info(), mesh, options);
         },
         started);
-    for (int i = 0; i < body->m_nodes.size(); ++i) body->m_nodes[i].m_v = to_bullet(setup.velocities.col(i));
+    for (int i = 0; i < object.velocities.cols(); ++i) body->m_nodes[i].m_v = to_bullet(object.velocities.col(i));
     // What is measured does not fall asleep, unless sleep is what the scene shows.
     body->forceActivationState(setup.sleeps ? ACTIVE_TAG : DISABLE_DEACTIVATION);
     world.add(*body);
-    AttachOptions attach{.step = setup.step, .contact_points = setup.body.contact_points()};
-    if (setup.body.surface) attach.surface = BodySurface::of(*setup.body.surface);
-    contact_points = attach.contact_points;
-    if (contact_points.empty())
-      for (int i = 0; i < body->m_nodes.size(); ++i) contact_points.push_back(WeightedPoint::at_particle(i));
-    world.attached().attach(*body, std::move(setup.field), attach);
-    tip_start = mean_tip_height(pack(setup.positions));
+    AttachOptions attach{.step = setup.step, .contact_points = object.mesh.contact_points()};
+    if (object.mesh.surface) attach.surface = BodySurface::of(*object.mesh.surface);
+    std::vector<WeightedPoint>& points = contact_points.emplace_back(attach.contact_points);
+    if (points.empty())
+      for (int i = 0; i < body->m_nodes.size(); ++i) points.push_back(WeightedPoint::at_particle(i));
+    world.attached().attach(*body, std::move(object.field), attach);
+    bodies.push_back(std::move(body));
   }
 
   void restart_if_due(Real step) {
     while (restarts_done < setup.restarts.size() && time >= setup.restarts[restarts_done].time - step / 4) {
-      const Eigen::Matrix3Xd& positions = setup.restarts[restarts_done++].positions;
-      for (int i = 0; i < body->m_nodes.size(); ++i) {
-        body->m_nodes[i].m_x = to_bullet(positions.col(i));
-        body->m_nodes[i].m_v.setZero();
+      const Restart& restart = setup.restarts[restarts_done++];
+      btSoftBody& body = *bodies[restart.body];
+      for (int i = 0; i < body.m_nodes.size(); ++i) {
+        body.m_nodes[i].m_x = to_bullet(restart.positions.col(i));
+        body.m_nodes[i].m_v.setZero();
       }
     }
   }
 
-  const Particles& particles() const { return const_cast<BulletWorld&>(world).attached().particles(*body); }
-
-  Real mean_tip_height(const Positions& x) const {
-    Real sum = 0;
-    for (int i : setup.tip) sum += x(1, i);
-    return setup.tip.empty() ? 0 : sum / static_cast<Real>(setup.tip.size());
-  }
+  const AttachedBodies& attached() const { return const_cast<BulletWorld&>(world).attached(); }
+  const Particles& particles(std::size_t body) const { return attached().particles(*bodies[body]); }
 };
 
 Scene::Scene(SceneSetup setup, WorldKind world) : impl_(std::make_unique<Impl>(std::move(setup), world)) {}
@@ -152,8 +147,11 @@ Scene::~Scene() = default;
 void Scene::step(Real duration) {
   Impl& scene = *impl_;
   const bool was_asleep = is_asleep();
-  if (scene.setup.control && scene.time >= scene.setup.control_start - duration / 4)
-    scene.setup.control(scene.world.attached().edit(*scene.body), scene.time);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const SoftObject& object = scene.setup.bodies[b];
+    if (object.control && scene.time >= object.control_start - duration / 4)
+      object.control(scene.world.attached().edit(*scene.bodies[b]), scene.time);
+  }
   scene.restart_if_due(duration);
   scene.time += duration;
   for (std::size_t b = 0; b < scene.setup.objects.size(); ++b)
@@ -162,26 +160,65 @@ void Scene::step(Real duration) {
   scene.world.step(duration);
   if (is_asleep()) scene.time_asleep += duration;
   if (was_asleep && !is_asleep()) ++scene.wakings;
-  if (scene.setup.watch) scene.setup.watch(particles().positions, field(), scene.time);
+  if (scene.setup.watch) scene.setup.watch(state());
 }
 
 Real Scene::time() const { return impl_->time; }
 
 const SceneSetup& Scene::setup() const { return impl_->setup; }
-const PotentialField& Scene::field() const { return impl_->world.attached().field(*impl_->body); }
-const Particles& Scene::particles() const { return impl_->particles(); }
-const StepReport& Scene::report() const { return impl_->world.attached().report(*impl_->body); }
-std::vector<LedgerEntry> Scene::ledger() const { return impl_->world.attached().ledger(*impl_->body); }
-const EnergyFlows& Scene::flows() const { return impl_->world.attached().flows(*impl_->body); }
-bool Scene::is_asleep() const { return impl_->body->getActivationState() == ISLAND_SLEEPING; }
+const PotentialField& Scene::field(std::size_t body) const { return impl_->attached().field(*impl_->bodies[body]); }
+const Particles& Scene::particles(std::size_t body) const { return impl_->particles(body); }
+const StepReport& Scene::report(std::size_t body) const { return impl_->attached().report(*impl_->bodies[body]); }
+
+SceneState Scene::state() const {
+  SceneState state{.time = time(), .objects = objects()};
+  for (std::size_t b = 0; b < impl_->bodies.size(); ++b) state.bodies.push_back({particles(b), field(b)});
+  return state;
+}
+
+StepReport Scene::report() const {
+  StepReport all;
+  for (std::size_t b = 0; b < impl_->bodies.size(); ++b) {
+    const StepReport& one = report(b);
+    if (one.integrator == Integrator::implicit_step) all.integrator = one.integrator;
+    all.substeps = std::max(all.substeps, one.substeps);
+    all.newton_iterations += one.newton_iterations;
+    all.retries = std::max(all.retries, one.retries);
+    all.finite = all.finite && one.finite;
+    all.contact_depth = std::max(all.contact_depth, one.contact_depth);
+    all.num_contacts += one.num_contacts;
+  }
+  return all;
+}
+
+std::vector<LedgerEntry> Scene::ledger() const {
+  std::vector<LedgerEntry> all;
+  for (const auto& body : impl_->bodies)
+    for (LedgerEntry& entry : impl_->attached().ledger(*body)) all.push_back(std::move(entry));
+  return all;
+}
+
+EnergyFlows Scene::flows() const {
+  EnergyFlows all;
+  for (const auto& body : impl_->bodies) all += impl_->attached().flows(*body);
+  return all;
+}
+
+bool Scene::is_asleep() const {
+  return std::all_of(impl_->bodies.begin(), impl_->bodies.end(),
+                     [](const auto& body) { return body->getActivationState() == ISLAND_SLEEPING; });
+}
 
 Energies Scene::energies() const {
-  const Particles& p = particles();
-  Energies energies{.elastic = field().energy(p.positions), .kinetic = kinetic_energy(p)};
+  Energies energies;
   const Vector3& gravity = impl_->setup.gravity;
-  for (int i = 0; i < p.size(); ++i)
-    if (p.inverse_masses[i] > 0)
-      energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
+  for (const auto& [p, field] : state().bodies) {
+    energies.elastic += field.energy(p.positions);
+    energies.kinetic += kinetic_energy(p);
+    for (int i = 0; i < p.size(); ++i)
+      if (p.inverse_masses[i] > 0)
+        energies.gravitational -= gravity.dot(p.positions.col(i).head<3>()) / p.inverse_masses[i];
+  }
   for (std::size_t b = 0; b < impl_->setup.objects.size(); ++b) {
     const RigidObject& object = impl_->setup.objects[b];
     if (!object.pushes_back()) continue;
@@ -196,13 +233,16 @@ Energies Scene::energies() const {
 }
 
 Momenta Scene::momenta() const {
-  const Particles& p = particles();
-  Momenta momenta{linear_momentum(p), angular_momentum(p)};
-  for (int i = 0; i < p.size(); ++i) {
-    if (!(p.inverse_masses[i] > 0)) continue;
-    const Real momentum = p.velocities.col(i).norm() / p.inverse_masses[i];
-    momenta.linear_scale += momentum;
-    momenta.angular_scale += momentum * p.positions.col(i).norm();
+  Momenta momenta;
+  for (const auto& [p, field] : state().bodies) {
+    momenta.linear += linear_momentum(p);
+    momenta.angular += angular_momentum(p);
+    for (int i = 0; i < p.size(); ++i) {
+      if (!(p.inverse_masses[i] > 0)) continue;
+      const Real momentum = p.velocities.col(i).norm() / p.inverse_masses[i];
+      momenta.linear_scale += momentum;
+      momenta.angular_scale += momentum * p.positions.col(i).norm();
+    }
   }
   return momenta;
 }
@@ -217,26 +257,33 @@ std::vector<Pose> Scene::objects() const {
 }
 
 Real Scene::penetration() const {
-  const PackedVectors& x = particles().positions;
   const std::vector<Pose> poses = objects();
   Real deepest = 0;
-  for (const WeightedPoint& point : impl_->contact_points) {
-    const Vector3 position = point.of(x);
-    if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
-    for (std::size_t b = 0; b < poses.size(); ++b)
-      deepest = std::max(deepest, depth(impl_->setup.objects[b], poses[b], position));
-  }
+  for (std::size_t body = 0; body < impl_->bodies.size(); ++body)
+    for (const WeightedPoint& point : impl_->contact_points[body]) {
+      const Vector3 position = point.of(particles(body).positions);
+      if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
+      for (std::size_t b = 0; b < poses.size(); ++b)
+        deepest = std::max(deepest, depth(impl_->setup.objects[b], poses[b], position));
+    }
   return deepest;
 }
 
 std::optional<Real> Scene::tip_drop() const {
-  if (impl_->setup.tip.empty()) return {};
-  return impl_->tip_start - impl_->mean_tip_height(particles().positions);
+  Real start = 0, now = 0, vertices = 0;
+  for (std::size_t b = 0; b < impl_->bodies.size(); ++b)
+    for (const int i : impl_->setup.bodies[b].tip) {
+      start += impl_->setup.bodies[b].positions(1, i);
+      now += particles(b).positions(1, i);
+      ++vertices;
+    }
+  if (vertices == 0) return {};
+  return start / vertices - now / vertices;
 }
 
 std::vector<Fact> Scene::facts() const {
   const Impl& scene = *impl_;
-  std::vector<Fact> facts = scene.setup.facts ? scene.setup.facts(particles().positions, field()) : std::vector<Fact>{};
+  std::vector<Fact> facts = scene.setup.facts ? scene.setup.facts(state()) : std::vector<Fact>{};
   if (scene.setup.sleeps) {
     facts.push_back({"time_asleep", scene.time_asleep});
     facts.push_back({"wakings", static_cast<double>(scene.wakings)});
@@ -246,8 +293,10 @@ std::vector<Fact> Scene::facts() const {
 
 bool Scene::is_free() const {
   const SceneSetup& setup = impl_->setup;
-  return setup.gravity.isZero(0) && setup.pinned.empty() && !setup.ground && setup.objects.empty() &&
-         setup.step.drag == 0 && setup.restarts.empty();
+  return setup.gravity.isZero(0) && !setup.ground && setup.objects.empty() && setup.step.drag == 0 &&
+         setup.restarts.empty() && std::all_of(setup.bodies.begin(), setup.bodies.end(), [](const SoftObject& object) {
+           return object.pinned.empty();
+         });
 }
 
 }  // namespace penalty::demo

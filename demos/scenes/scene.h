@@ -18,9 +18,9 @@ struct Energies {  // [J]
   Real total() const { return elastic + kinetic + rigid_kinetic + gravitational; }
 };
 
-/// Momenta of everything that moves, and the sums of magnitudes that they are to be compared with.
+/// Momenta of the soft bodies, and the sums of magnitudes that they are to be compared with.
 struct Momenta {
-  Vector3 linear, angular;  // angular: about the origin [kg m/s], [kg m²/s]
+  Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();  // angular: about the origin [kg m/s], [kg m²/s]
   Real linear_scale = 0, angular_scale = 0;
 };
 
@@ -36,14 +36,16 @@ class Scene {
   void step(Real duration);
   Real time() const;  // [s]
 
-  const SceneSetup& setup() const;  // its field has gone into the world
-  const PotentialField& field() const;
-  const Particles& particles() const;
-  const StepReport& report() const;
+  const SceneSetup& setup() const;  // its fields have gone into the world
+  SceneState state() const;         // refers to the scene
+  const PotentialField& field(std::size_t body = 0) const;
+  const Particles& particles(std::size_t body = 0) const;
+  const StepReport& report(std::size_t body) const;
+  StepReport report() const;  // of all bodies: sums and extremes
 
-  std::vector<LedgerEntry> ledger() const;  // one entry a batch of elements; names are valid as long as the scene
-  const EnergyFlows& flows() const;         // since the start
-  bool is_asleep() const;
+  std::vector<LedgerEntry> ledger() const;  // one entry a batch of elements, body by body
+  EnergyFlows flows() const;                // of all bodies, since the start
+  bool is_asleep() const;                   // all bodies are
 
   Energies energies() const;
   Momenta momenta() const;
@@ -53,10 +55,10 @@ class Scene {
   /// is.
   Real penetration() const;
 
-  /// Mean drop of the tip's vertices below their start, which is the rest shape [m]; empty without a tip.
+  /// Mean drop of the tips' vertices below their start, which is the rest shape [m]; empty without a tip.
   std::optional<Real> tip_drop() const;
 
-  /// What the setup measures; of a body that may sleep also how long it did and how often it woke.
+  /// What the setup measures; of bodies that may sleep also how long they did and how often they woke.
   std::vector<Fact> facts() const;
 
   /// Nothing from outside acts: both momenta should stay what they are.

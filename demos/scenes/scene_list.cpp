@@ -2,13 +2,15 @@
 
 #include "penalty/fields/elastic_field.h"
 #include "scenes/scene_setup.h"
+#include "scenes/start_shapes.h"
 
 namespace penalty::demo {
 
 const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> list{
-      drop_scene,   beam_scene,    flight_scene, cloth_scene,           fold_scene,    balloon_scene,
-      muscle_scene, plastic_scene, tear_scene,   user_constraint_scene, recover_scene, potential_field_scene};
+      drop_scene,    beam_scene, flight_scene,          cloth_scene,          fold_scene,  balloon_scene, muscle_scene,
+      plastic_scene, tear_scene, user_constraint_scene, collide_scene,        stack_scene, bowl_scene,    press_scene,
+      incline_scene, hand_scene, recover_scene,         potential_field_scene};
   return list;
 }
 
@@ -43,6 +45,15 @@ Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Ma
   material.check(model);
   const auto make = options.phases.value_or(phases) == 2 ? &recovering : &elastic;
   return {make(mesh, material, model), material.density * volume(mesh)};
+}
+
+SoftObject soft_object(const SceneOptions& options, const BodyMesh& mesh, const Material& material, const Pose& pose) {
+  Elasticity elastic = elasticity(options, mesh.solid(), material);
+  const Eigen::Matrix3Xd start = start_positions(mesh.vertices(), options.start.value_or(Start::rest), options.seed);
+  return {.mesh = mesh,
+          .field = std::move(elastic.field),
+          .mass = elastic.mass,
+          .positions = (pose.rotation * start).colwise() + pose.position};
 }
 
 StepOptions step_options(const SceneOptions& options, StepOptions by_default) {

@@ -9,9 +9,10 @@
 #include "penalty/fields/elastic_field.h"
 #include "penalty/fields/ledger.h"
 #include "penalty/stepping/step_options.h"
-#include "scenes/body_mesh.h"
 #include "scenes/figure.h"
 #include "scenes/rigid_object.h"
+#include "scenes/scene_state.h"
+#include "scenes/soft_object.h"
 
 namespace penalty::demo {
 
@@ -22,48 +23,40 @@ struct Look {
   bool wire = true;                     // the edges of the triangles, but for an embedded surface
   bool strain = false;                  // colours show strain, unless the user says otherwise
   std::optional<Real> color_high = {};  // top of the colours; empty: what most of the body reaches at some time
-  std::optional<Real> reach =
-      {};  // the clip shows a ball about the rest shape, that many times as large; empty: all that moves
+  /// The clip shows balls about the rest shapes, so many times as large; empty: all that moves.
+  std::optional<Real> reach = {};
 };
 
-/// The body is put somewhere else, at rest.
+/// A body is put somewhere else, at rest.
 struct Restart {
   Real time;         // [s]
   std::string name;  // what the picture says from then on
   Eigen::Matrix3Xd positions;
+  std::size_t body = 0;
 };
 
 struct SceneSetup {
   std::string name;
   std::string title;  // of pictures
-  BodyMesh body;
-  PotentialField field;
-  Real mass = 1;                           // of the soft body, the same for every vertex [kg]
-  Eigen::Matrix3Xd positions, velocities;  // at the start, 3 x vertices [m], [m/s]
-  std::vector<Restart> restarts = {};      // in the course of the scene, in order
-  std::vector<int> pinned;                 // vertices that nothing moves
-  Vector3 gravity = Vector3::Zero();       // [m/s²]
-  bool ground = false;                     // a static box whose top is y = 0
-  std::vector<RigidObject> objects;
-  StepOptions step;
-  std::vector<int> tip;  // vertices whose mean drop is followed
-  Look look;
-  /// Called before each world step with the time at its start [s]: what changes about the elements in the course of the
-  /// scene. Empty: nothing does. Before `control_start` it is not called, since looking for changes wakes the body.
-  std::function<void(PotentialField& field, Real time)> control = {};
-  Real control_start = 0;  // [s]
-  bool sleeps = false;     // at rest the world may stop stepping the body; the deformable world then does
-  /// Called after each world step with the time at its end [s]: what has to be seen as it happens. Empty: nothing has.
-  std::function<void(const Positions& x, const PotentialField& field, Real time)> watch = {};
-  /// What the summary says of this scene alone, from positions and field at the end. Empty: nothing.
-  std::function<std::vector<Fact>(const Positions& x, const PotentialField& field)> facts = {};
+  std::vector<SoftObject> bodies = {};
+  std::vector<Restart> restarts = {};  // in the course of the scene, in order
+  Vector3 gravity = Vector3::Zero();   // [m/s²]
+  bool ground = false;                 // a static box whose top is y = 0
+  std::vector<RigidObject> objects = {};
+  StepOptions step = {};  // of every body
+  Look look = {};
+  bool sleeps = false;  // at rest the world may stop stepping the bodies; the deformable world then does
+  /// Called after each world step: what has to be seen as it happens. Empty: nothing has.
+  std::function<void(const SceneState&)> watch = {};
+  /// What the summary says of this scene alone, from its state at the end. Empty: nothing.
+  std::function<std::vector<Fact>(const SceneState&)> facts = {};
 };
 
 /// A scene is stepped, or, if it has a `figure`, only drawn; then it has no body and no setup.
 struct SceneEntry {
   std::string_view name, description;
   Real duration;  // of the run, or of the clip that goes round the figure, unless the user says otherwise [s]
-  BodyMesh (*body)(const SceneOptions&);  // may take a second; does not depend on the seed
+  BodyMesh (*body)(const SceneOptions&);  // of which the soft ones are made; may take a second; whatever the seed
   SceneSetup (*setup)(const SceneOptions&, const BodyMesh&);
   std::vector<Figure> (*figures)(const SceneOptions&) = nullptr;
 };
@@ -75,7 +68,8 @@ const SceneEntry& find_scene(std::string_view name);
 
 // One file each.
 extern const SceneEntry drop_scene, beam_scene, flight_scene, cloth_scene, fold_scene, balloon_scene, muscle_scene,
-    plastic_scene, tear_scene, user_constraint_scene, recover_scene, potential_field_scene;
+    plastic_scene, tear_scene, user_constraint_scene, collide_scene, stack_scene, bowl_scene, press_scene,
+    incline_scene, hand_scene, recover_scene, potential_field_scene;
 
 /// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
 /// it.
@@ -85,6 +79,9 @@ struct Elasticity {
 };
 Elasticity elasticity(const SceneOptions& options, const TetMesh& mesh, const Material& by_default,
                       ElasticModel default_model = ElasticModel::springs_volumes, int phases = 1);
+
+/// A body of this mesh and material, or of what the user wants, at rest at `pose`; its start shape is the user's.
+SoftObject soft_object(const SceneOptions& options, const BodyMesh& mesh, const Material& material, const Pose& pose);
 
 /// `by_default` with what the user chose. Throws std::invalid_argument.
 StepOptions step_options(const SceneOptions& options, StepOptions by_default);

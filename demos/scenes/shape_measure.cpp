@@ -7,6 +7,32 @@
 
 namespace penalty::demo {
 
+namespace {
+
+void raise(Real& largest, Real error) {
+  if (!(error <= largest)) largest = error;  // a NaN stays visible
+}
+
+}  // namespace
+
+ShapeErrors& ShapeErrors::operator+=(const ShapeErrors& other) {
+  const auto join = [](std::size_t count, Real& mean, Real& largest, std::size_t more, Real their_mean, Real theirs) {
+    if (count == 0) {
+      mean = their_mean;
+      largest = theirs;
+    } else if (more > 0) {
+      mean += (their_mean - mean) * static_cast<Real>(more) / static_cast<Real>(count + more);
+      raise(largest, theirs);
+    }
+  };
+  join(edges, length_mean, length_max, other.edges, other.length_mean, other.length_max);
+  join(tetrahedra, volume_mean, volume_max, other.tetrahedra, other.volume_mean, other.volume_max);
+  edges += other.edges;
+  tetrahedra += other.tetrahedra;
+  inverted += other.inverted;
+  return *this;
+}
+
 ShapeMeasure::ShapeMeasure(const Eigen::Matrix3Xd& rest, std::vector<Edge> edges,
                            std::span<const Tetrahedron> tetrahedra)
     : rest_(rest),
@@ -17,15 +43,12 @@ ShapeMeasure::ShapeMeasure(const Eigen::Matrix3Xd& rest, std::vector<Edge> edges
 }
 
 ShapeErrors ShapeMeasure::errors(const Positions& x) const {
-  ShapeErrors errors;
-  const auto worst = [](Real& largest, Real error) {
-    if (!(error <= largest)) largest = error;  // a NaN stays visible
-  };
+  ShapeErrors errors{.edges = edges_.size(), .tetrahedra = tetrahedra_.size()};
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const Vector3 d = (x.col(edges_[e][1]) - x.col(edges_[e][0])).head<3>();
     const Real error = std::abs(d.norm() / lengths_[e] - 1);
     errors.length_mean += error / static_cast<Real>(edges_.size());
-    worst(errors.length_max, error);
+    raise(errors.length_max, error);
   }
   if (tetrahedra_.empty()) errors.volume_mean = errors.volume_max = std::numeric_limits<Real>::quiet_NaN();
   for (std::size_t t = 0; t < tetrahedra_.size(); ++t) {
@@ -34,7 +57,7 @@ ShapeErrors ShapeMeasure::errors(const Positions& x) const {
     const Real volume = (corner(1) - origin).dot((corner(2) - origin).cross(corner(3) - origin)) / 6;
     const Real error = std::abs(volume / volumes_[t] - 1);
     errors.volume_mean += error / static_cast<Real>(tetrahedra_.size());
-    worst(errors.volume_max, error);
+    raise(errors.volume_max, error);
     if (!(volume > 0)) ++errors.inverted;
   }
   return errors;

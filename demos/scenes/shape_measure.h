@@ -8,9 +8,13 @@
 namespace penalty::demo {
 
 struct ShapeErrors {
-  Real length_mean = 0, length_max = 0;  // |L - L0| / L0 over the edges
-  Real volume_mean = 0, volume_max = 0;  // |V - V0| / V0 over the tetrahedra; NaN without any
-  int inverted = 0;                      // tetrahedra of volume zero or less
+  std::size_t edges = 0, tetrahedra = 0;  // that were measured
+  Real length_mean = 0, length_max = 0;   // |L - L0| / L0 over the edges
+  Real volume_mean = 0, volume_max = 0;   // |V - V0| / V0 over the tetrahedra; NaN without any
+  int inverted = 0;                       // tetrahedra of volume zero or less
+
+  /// Those of both bodies together.
+  ShapeErrors& operator+=(const ShapeErrors& other);
 };
 
 class ShapeMeasure {

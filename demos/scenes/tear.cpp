@@ -19,8 +19,8 @@ constexpr Real safety = 0.2;   // of the substeps: what breaks sends out the fas
 constexpr Real ripple = 2e-3;  // of the start, out of its plane: what is quite flat would stay so for ever [m]
 
 /// Elements that were there, that are, and what left with those that broke.
-std::vector<Fact> facts(const Positions&, const PotentialField& field) {
-  const Batch<Length>& springs = *field.find<Length>();
+std::vector<Fact> facts(const SceneState& state) {
+  const Batch<Length>& springs = *state.field().find<Length>();
   int enabled = 0;
   for (int e = 0; e < static_cast<int>(springs.num_elements()); ++e) enabled += springs.is_enabled(e);
   double energy = 0;
@@ -71,17 +71,15 @@ SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
   }
   return {.name = "tear",
           .title = "A sheet rips",
-          .body = body,
-          .field = std::move(field),
-          .mass = foil.density * foil.thickness * area(body.shell()),
-          .positions = positions,
-          .velocities = velocities,
-          .pinned = ends,
+          .bodies = alone({.mesh = body,
+                           .field = std::move(field),
+                           .mass = foil.density * foil.thickness * area(body.shell()),
+                           .positions = positions,
+                           .velocities = velocities,
+                           .pinned = ends}),
           .gravity = {0, -9.81, 0},
           .ground = true,
-          .objects = {},
           .step = step_options(options, {.damping_time = damping, .safety = safety, .contact_safety = safety}),
-          .tip = {},
           .look = {.azimuth = 18, .elevation = 10, .still_time = 0.78},
           .facts = facts};
 }

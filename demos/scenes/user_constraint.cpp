@@ -83,25 +83,22 @@ SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
   for (int i : held) positions.col(i) = rest.col(i);
   return {.name = "user_constraint",
           .title = "A bar winds itself up",
-          .body = body,
-          .field = std::move(elastic.field),
-          .mass = elastic.mass,
-          .positions = positions,
-          .velocities = Eigen::Matrix3Xd::Zero(3, rest.cols()),
-          .pinned = held,
+          .bodies = alone({.mesh = body,
+                           .field = std::move(elastic.field),
+                           .mass = elastic.mass,
+                           .positions = positions,
+                           .pinned = held,
+                           .control =
+                               [sections](PotentialField& field, Real time) {
+                                 const Real t = std::min(time / wound, 1.0), share = t * t * (3 - 2 * t);
+                                 field.find("twist")->set_targets(share * 2 * std::numbers::pi * turns / sections);
+                               }}),
           .gravity = {0, -9.81, 0},
           .ground = true,
-          .objects = {},
           .step = step_options(options, {.damping_time = damping, .drag = 0.5}),
-          .tip = {},
           .look = {.azimuth = 24, .elevation = 8},
-          .control =
-              [sections](PotentialField& field, Real time) {
-                const Real t = std::min(time / wound, 1.0), share = t * t * (3 - 2 * t);
-                field.find("twist")->set_targets(share * 2 * std::numbers::pi * turns / sections);
-              },
-          .facts = [sections](const Positions& x, const PotentialField& field) -> std::vector<Fact> {
-            return {{"turns", num_turns(x, field, sections)}, {"wanted_turns", turns}};
+          .facts = [sections](const SceneState& state) -> std::vector<Fact> {
+            return {{"turns", num_turns(state.x(), state.field(), sections)}, {"wanted_turns", turns}};
           }};
 }
 

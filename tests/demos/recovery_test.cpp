@@ -16,7 +16,7 @@ INSTANTIATE_TEST_SUITE_P(Worlds, Recovery, testing::Values(WorldKind::classic, W
 constexpr Real frame = 1.0 / 60;
 
 Real rest_error(const Scene& scene) {
-  const BodyMesh& body = scene.setup().body;
+  const BodyMesh& body = scene.setup().bodies[0].mesh;
   return ShapeMeasure(body.vertices(), body.edges(), body.tetrahedra()).rest_error(scene.particles().positions);
 }
 
@@ -49,7 +49,7 @@ TEST_P(Recovery, FromEveryStartWithinFiveSeconds) {
       EXPECT_LT(rest_error(*scene), 1e-6);
       // From rest there is no momentum, and there is none now: the body turns nowhere.
       const Momenta momenta = scene->momenta();
-      EXPECT_LT(momenta.angular.norm(), 1e-9 * scene->setup().mass);
+      EXPECT_LT(momenta.angular.norm(), 1e-9 * scene->setup().bodies[0].mass);
     }
   }
 }

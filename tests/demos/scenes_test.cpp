@@ -10,7 +10,7 @@ namespace {
 INSTANTIATE_TEST_SUITE_P(Worlds, Scenes, testing::Values(WorldKind::classic, WorldKind::deformable), world_name);
 
 ShapeErrors errors(const Scene& scene) {
-  const BodyMesh& body = scene.setup().body;
+  const BodyMesh& body = scene.setup().bodies[0].mesh;
   return ShapeMeasure(body.vertices(), body.edges(), body.tetrahedra()).errors(scene.particles().positions);
 }
 
@@ -61,7 +61,7 @@ TEST_P(Scenes, DropCarriesAnEmbeddedSurface) {
   SceneOptions options{.cells = 8};
   ASSERT_TRUE(std::filesystem::exists(bunny_path())) << "package glmark2-data is not installed";
   const auto scene = make("drop", options);
-  ASSERT_TRUE(scene->setup().body.surface);
+  ASSERT_TRUE(scene->setup().bodies[0].mesh.surface);
   Real deepest = 0;
   for (int step = 0; step < 96; ++step) {
     scene->step(dt);
@@ -69,7 +69,7 @@ TEST_P(Scenes, DropCarriesAnEmbeddedSurface) {
   }
   ASSERT_TRUE(scene->report().finite);
   EXPECT_LT(deepest, margin);
-  const Eigen::Matrix3Xd surface = scene->setup().body.drawn(scene->particles().positions.topRows<3>());
+  const Eigen::Matrix3Xd surface = scene->setup().bodies[0].mesh.drawn(scene->particles().positions.topRows<3>());
   EXPECT_LT(surface.row(1).minCoeff(), 0.2);  // it has landed
   EXPECT_LT(scene->particles().positions.row(1).minCoeff(),
             surface.row(1).minCoeff());  // the lattice reaches beyond it
@@ -79,15 +79,16 @@ TEST_P(Scenes, BeamHangsFromItsClampedFace) {
   const auto scene = make("beam", {.cells = 16});
   EXPECT_FALSE(scene->is_free());
   for (int step = 0; step < 32; ++step) scene->step(dt);
-  for (int i : scene->setup().pinned)
-    EXPECT_LT((scene->particles().positions.col(i).head<3>() - scene->setup().positions.col(i)).norm(), 1e-12);
+  for (int i : scene->setup().bodies[0].pinned)
+    EXPECT_LT((scene->particles().positions.col(i).head<3>() - scene->setup().bodies[0].positions.col(i)).norm(),
+              1e-12);
   EXPECT_GT(scene->tip_drop().value_or(0), 0.4);  // it swings beyond its rest, 0.27 m below the start
   EXPECT_EQ(errors(*scene).inverted, 0);
 }
 
 TEST_P(Scenes, ASquashedBodyFindsItsShapeAgain) {
   const auto scene = make("flight", {.mesh = "box", .cells = 4, .stiffness = 1, .start = Start::squash});
-  const TetMesh& mesh = scene->setup().body.solid();
+  const TetMesh& mesh = scene->setup().bodies[0].mesh.solid();
   const ShapeMeasure measure(mesh.vertices, mesh.tetrahedra);
   ASSERT_GT(measure.rest_error(scene->particles().positions), 0.1);
   for (int step = 0; step < 256; ++step) scene->step(dt);
@@ -113,8 +114,9 @@ TEST_P(Scenes, ClothStartsUnstrainedAndCatchesTheBall) {
   }
   EXPECT_LT(gain, 0.02);
   EXPECT_LT(deepest, margin);
-  for (int i : scene->setup().pinned)
-    EXPECT_LT((scene->particles().positions.col(i).head<3>() - scene->setup().positions.col(i)).norm(), rounding);
+  for (int i : scene->setup().bodies[0].pinned)
+    EXPECT_LT((scene->particles().positions.col(i).head<3>() - scene->setup().bodies[0].positions.col(i)).norm(),
+              rounding);
   const Vector3 ball = scene->objects().front().position;
   EXPECT_GT(ball.y(), 0.3) << "held above the ground, where its middle would be at 0.25 m";
   EXPECT_LT(ball.y(), 1.25) << "and no longer on its way";
@@ -131,7 +133,7 @@ TEST_P(Scenes, AFinerClothIsAsStiff) {
   std::vector<Real> energies;
   for (const int cells : {8, 32}) {
     const auto scene = make("cloth", {.cells = cells});
-    const Eigen::Matrix3Xd rest = scene->setup().body.vertices();
+    const Eigen::Matrix3Xd rest = scene->setup().bodies[0].mesh.vertices();
     energies.push_back(scene->field().energy(pack(Vector3(1.02, 1, 1.01).asDiagonal() * rest)));
   }
   ASSERT_GT(energies[0], 0.1);
@@ -144,7 +146,7 @@ TEST_P(Scenes, ABentClothHoldsTheEnergyOfAPlate) {
   constexpr Real radius = 1, area = 4, plate = 8e5 * 1e-9 * 3 / 32 / (2 * radius * radius) * area;
   for (const int cells : {10, 40}) {
     const auto scene = make("cloth", {.cells = cells});
-    Eigen::Matrix3Xd rolled = scene->setup().body.vertices();
+    Eigen::Matrix3Xd rolled = scene->setup().bodies[0].mesh.vertices();
     for (int i = 0; i < rolled.cols(); ++i) {
       const Real angle = rolled(0, i) / radius;
       rolled(0, i) = radius * std::sin(angle);
@@ -160,19 +162,13 @@ SceneSetup press(const Vector3& press_start) {
   BodyMesh body{make_box({0.4, 0.4, 0.4}, {2, 2, 2})};
   SceneSetup setup{.name = "press",
                    .title = "Press",
-                   .body = body,
-                   .field = make_elastic_field(body.vertices(), body.solid().tetrahedra, 10.0),
-                   .positions = body.vertices(),
-                   .velocities = Eigen::Matrix3Xd::Zero(3, body.vertices().cols()),
-                   .pinned = {},
-                   .objects = {},
-                   .step = {},
-                   .tip = {},
-                   .look = {}};
-  setup.positions.row(1).array() += 0.02;
-  setup.gravity = {0, -9.81, 0};
-  setup.ground = true;
-  setup.step.damping_time = 0.01;
+                   .bodies = alone({.mesh = body,
+                                    .field = make_elastic_field(body.vertices(), body.solid().tetrahedra, 10.0),
+                                    .positions = body.vertices()}),
+                   .gravity = {0, -9.81, 0},
+                   .ground = true,
+                   .step = {.damping_time = 0.01}};
+  setup.bodies[0].positions.row(1).array() += 0.02;
   setup.objects.push_back({.shape = Block{{0.4, 0.05, 0.4}}, .path = [press_start](Real time) {
                              return Pose{.position = press_start - Vector3(0, 0.1 * std::min(time, 1.0), 0)};
                            }});
@@ -196,11 +192,41 @@ TEST_P(Scenes, ABlockFollowsItsPathAndPresses) {
   EXPECT_NEAR(scene.energies().rigid_kinetic, 0, 1e-2);
 }
 
+TEST_P(Scenes, SeveralBodiesAddUp) {
+  SceneSetup setup = press({0.2, 2, 0.2});
+  const BodyMesh mesh = setup.bodies[0].mesh;
+  SoftObject thrown{.mesh = mesh,
+                    .field = make_elastic_field(mesh.vertices(), mesh.solid().tetrahedra, 20.0),
+                    .mass = 2,
+                    .positions = (1.1 * mesh.vertices()).colwise() + Vector3(1, 1, 0),
+                    .velocities = Vector3(3, 0, 0).replicate(1, mesh.vertices().cols())};
+  setup.bodies.push_back(std::move(thrown));
+  Scene scene(std::move(setup), GetParam());
+  const Energies energies = scene.energies();
+  EXPECT_LT(scene.field(0).energy(scene.particles(0).positions), 1e-9);
+  EXPECT_NEAR(energies.elastic, scene.field(1).energy(scene.particles(1).positions), 1e-9);
+  ASSERT_GT(energies.elastic, 1e-3);
+  EXPECT_NEAR(energies.kinetic, 9, 1e-5) << "2 kg at 3 m/s";
+  EXPECT_NEAR(energies.gravitational, 9.81 * (0.22 + 2 * 1.22 + 2 * 1), 1e-4) << "and 2 kg of a block, 1 m high";
+  EXPECT_NEAR((scene.momenta().linear - Vector3(6, 0, 0)).norm(), 0, 1e-5);
+  const std::vector<LedgerEntry> ledger = scene.ledger();
+  ASSERT_EQ(ledger.size(), 4u);
+  EXPECT_EQ(ledger[0].name, ledger[2].name);
+  EXPECT_GT(ledger[2].energy, 1e3 * ledger[0].energy);
+  for (int step = 0; step < 16; ++step) scene.step(dt);
+  EXPECT_TRUE(scene.report().finite);
+  EXPECT_EQ(scene.report().substeps, std::max(scene.report(0).substeps, scene.report(1).substeps));
+  const SceneState state = scene.state();
+  EXPECT_NEAR(state.x(1).row(0).mean(), 1.22 + 3 * 16 * dt, 1e-3);
+  EXPECT_NEAR(state.x(0).row(0).mean(), 0.2, 1e-3);
+  EXPECT_EQ(state.objects.size(), 2u);
+}
+
 TEST_P(Scenes, ControlSeesTheFieldBeforeEachStep) {
   SceneSetup setup = press({0.2, 2, 0.2});
   std::vector<Real> times;
   std::size_t elements = 0;
-  setup.control = [&](PotentialField& field, Real time) {
+  setup.bodies[0].control = [&](PotentialField& field, Real time) {
     times.push_back(time);
     elements = field.num_elements();
   };

@@ -23,6 +23,32 @@ TEST(ShapeMeasure, ARigidMotionIsNoError) {
   EXPECT_EQ(shape.measure.errors(moved).inverted, 0);
 }
 
+TEST(ShapeErrors, OfTwoBodiesAreThoseOfBothAsOne) {
+  const TetMesh small = make_box({1, 1, 1}, {1, 1, 1}), large = make_box({1, 2, 3}, {2, 3, 4});
+  TetMesh both = large;
+  const auto first = static_cast<int>(large.vertices.cols());
+  both.vertices.conservativeResize(3, first + small.vertices.cols());
+  both.vertices.rightCols(small.vertices.cols()) = small.vertices;
+  for (const auto& [a, b, c, d] : small.tetrahedra)
+    both.tetrahedra.push_back({a + first, b + first, c + first, d + first});
+  Eigen::Matrix3Xd moved = both.vertices;
+  moved.leftCols(first) *= 1.1;
+  moved.rightCols(small.vertices.cols()).row(0) *= -1.3;  // inside-out
+
+  ShapeErrors sum;
+  sum += ShapeMeasure(large.vertices, large.tetrahedra).errors(pack(moved.leftCols(first)));
+  sum += ShapeMeasure(small.vertices, small.tetrahedra).errors(pack(moved.rightCols(small.vertices.cols())));
+  const ShapeErrors errors = ShapeMeasure(both.vertices, both.tetrahedra).errors(pack(moved));
+  EXPECT_NEAR(sum.length_mean, errors.length_mean, 1e-14);
+  EXPECT_NEAR(sum.volume_mean, errors.volume_mean, 1e-14);
+  EXPECT_EQ(sum.length_max, errors.length_max);
+  EXPECT_EQ(sum.volume_max, errors.volume_max);
+  EXPECT_EQ(sum.inverted, 5);
+  sum += ShapeMeasure(large.vertices, edges_of(large.tetrahedra)).errors(pack(large.vertices));  // has no volumes
+  EXPECT_NEAR(sum.volume_mean, errors.volume_mean, 1e-14);
+  EXPECT_LT(sum.length_mean, errors.length_mean);
+}
+
 TEST(ShapeMeasure, AScaledShapeErrsAsItsFactorsSay) {
   const Shape shape;
   const ShapeErrors errors = shape.measure.errors(pack(1.1 * shape.mesh.vertices));
