@@ -41,7 +41,7 @@ TEST_P(Scenes, DropFallsFreelyAndThenLiesOnTheGround) {
   EXPECT_EQ(scene->penetration(), 0);
 
   Real least = scene->energies().total(), gain = 0, deepest = 0;
-  for (; step < 4 * 64; ++step) {
+  for (; step < 12 * 64; ++step) {
     const Real before = scene->energies().total();
     scene->step(dt);
     ASSERT_TRUE(scene->report().finite) << "step " << step;
