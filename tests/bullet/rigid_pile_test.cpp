@@ -78,6 +78,7 @@ TEST_P(RigidPile, TwoTimesTenKilogramsOnATorusOfOne) {
 TEST_P(RigidPile, FiveBoxesOnATorus) {
   const btSoftBody& body = add_torus();
   std::vector<btRigidBody*> boxes;
+  boxes.reserve(5);
   for (int k = 0; k < 5; ++k) boxes.push_back(&sim.add_box({1.2, 0.1, 1.2}, 2, {0, 0.742 + 0.21 * k, 0}));
   expect_to_stand(body, boxes, {1.2, 0.1, 1.2});
 }

@@ -152,6 +152,7 @@ TEST_P(SmallRigid, ACornerOfAHullInACompoundStandsOnATriangle) {
     return compound;
   };
   std::vector<Vector3> samples;
+  samples.reserve(hull.getNumPoints());
   for (int k = 0; k < hull.getNumPoints(); ++k)
     samples.push_back(to_vector(hull.getScaledPoint(k)) + Vector3(0, 0.3, 0));
   expect_held(make, -0.2 + 0.04, Matrix3::Identity(), samples, false);
@@ -164,7 +165,7 @@ TEST_P(SmallRigid, AFastBallDoesNotPassATorus) {
     btSoftBody& body = sim.add_jelly(torus);
     btRigidBody& ball = sim.add_rigid(std::make_unique<btSphereShape>(btScalar(0.025)), 0.1, {1.4, 0.03, 0.02});
     ball.setLinearVelocity(btVector3(btScalar(-speed), 0, 0));
-    ball.setFriction(btScalar(0.01)); // Bullet takes spin beyond a quarter turn a step from rigid bodies
+    ball.setFriction(btScalar(0.01));  // Bullet takes spin beyond a quarter turn a step from rigid bodies
     const Totals start = sim.totals();
     Real deepest = 0, highest = start.energy;
     const Depth depth(torus, sim.penalty().particles(body).positions);

@@ -126,6 +126,7 @@ struct SheetAndBox {
   }
   static std::vector<WeightedPoint> points_of(const Body& body) {
     std::vector<WeightedPoint> points;
+    points.reserve(body.particles().size());
     for (int i = 0; i < body.particles().size(); ++i) points.push_back(WeightedPoint::at_particle(i));
     return points;
   }

@@ -74,6 +74,7 @@ class Owners {
   }
   std::vector<int> keys() const {
     std::vector<int> keys;
+    keys.reserve(islands_.size());
     for (const auto& [key, island] : islands_) keys.push_back(key);
     return keys;
   }

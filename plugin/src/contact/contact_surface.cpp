@@ -162,12 +162,9 @@ void ContactSurface::cut_into_patches() {
   };
   std::vector<int> all(triangles_.size());
   std::iota(all.begin(), all.end(), 0);
-  cut_all(
-      all, triangles_.size(), [&](int t) { return center_of(triangles_[t]); }, take_triangle);
-  cut_all(
-      left(has_edge), edges_.size(), [&](int e) { return center_of(edges_[e]); }, take_edge);
-  cut_all(
-      left(has_point), num_points(), [&](int i) { return rest_position(i); }, take_point);
+  cut_all(all, triangles_.size(), [&](int t) { return center_of(triangles_[t]); }, take_triangle);
+  cut_all(left(has_edge), edges_.size(), [&](int e) { return center_of(edges_[e]); }, take_edge);
+  cut_all(left(has_point), num_points(), [&](int i) { return rest_position(i); }, take_point);
 
   for (SurfacePatch& patch : patches_) {
     std::sort(patch.all_points.begin(), patch.all_points.end());

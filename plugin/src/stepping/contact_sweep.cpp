@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace penalty {
 namespace {
@@ -168,13 +169,16 @@ class HeldContacts {
 }  // namespace
 
 void sort_contacts(Island& island) {
+  std::vector<std::size_t>& begin = island.contacts_begin;
+  begin.assign(island.bodies.size() + 1, 0);
+  for (const Contact& contact : island.contacts) ++begin[contact.a.body + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
   const auto before = [](const Contact& l, const Contact& r) { return l.a.body < r.a.body; };
-  if (!std::is_sorted(island.contacts.begin(), island.contacts.end(), before))
-    std::stable_sort(island.contacts.begin(), island.contacts.end(), before);
-  island.contacts_begin.assign(island.bodies.size() + 1, island.contacts.size());
-  for (std::size_t k = island.contacts.size(); k-- > 0;)
-    for (int body = island.contacts[k].a.body; body >= 0 && island.contacts_begin[body] != k; --body)
-      island.contacts_begin[body] = k;
+  if (std::is_sorted(island.contacts.begin(), island.contacts.end(), before)) return;
+  std::vector<std::size_t> next = begin;
+  std::vector<Contact> sorted(island.contacts.size());
+  for (const Contact& contact : island.contacts) sorted[next[contact.a.body]++] = contact;
+  island.contacts = std::move(sorted);
 }
 
 bool is_in_contact(const Island& island, std::size_t body) {

@@ -18,7 +18,7 @@ constexpr int most_blocks = 8;           // of substeps, after each of which the
 constexpr Real retry_growth = 1.5;       // substeps of a repeated step
 constexpr int most_rigid_sweeps = 50;    // of a substep; they end when one changes speeds by less than
 constexpr Real rigid_tolerance = 1e-3;   // this share of the first,
-constexpr Real rigid_negligible = 0.02;  // or of what accelerations make of them
+constexpr Real rigid_negligible = 0.05;  // or of what accelerations make of them
 constexpr int fewest_on_held = 8;        // substeps where a rigid body may lie on points that are held
 constexpr Real substep_memory = 0.8;     // share of the last step's substeps that the next one starts from
 

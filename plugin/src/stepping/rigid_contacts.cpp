@@ -25,8 +25,13 @@ void RigidContacts::begin(Real h, Real since) {
     RigidBody &a = island_.rigid_bodies[contact.a], &b = island_.rigid_bodies[contact.b];
     const Vector3 at_a = a.position + a.rotation * contact.anchor_a, at_b = b.position + b.rotation * contact.anchor_b;
     const Vector3 at = (at_a + at_b) / 2;
-    Row row{
-        .a = &a, .b = &b, .arm_a = at - a.position, .arm_b = at - b.position, .normal = b.rotation * contact.normal};
+    Row row{.a = &a,
+            .b = &b,
+            .a_moves = a.is_dynamic(),
+            .b_moves = b.is_dynamic(),
+            .arm_a = at - a.position,
+            .arm_b = at - b.position,
+            .normal = b.rotation * contact.normal};
     row.mobility = a.mobility_at(row.arm_a, row.normal) + b.mobility_at(row.arm_b, row.normal);
     const Real gap = row.normal.dot(at_a - at_b), speed = row.normal.dot(relative_velocity(row));
     row.recovery = std::clamp<Real>((-gap - slop) / std::max(recovery_time, h), 0, recovery_speed);
@@ -48,14 +53,14 @@ void RigidContacts::begin(Real h, Real since) {
 }
 
 void RigidContacts::push(const Row& row, const Vector3& impulse) {
-  const auto give = [this](RigidBody& body, const Vector3& given, const Vector3& arm) {
-    if (body.is_dynamic())
+  const auto give = [this](RigidBody& body, bool moves, const Vector3& given, const Vector3& arm) {
+    if (moves)
       body.push(given, arm);
     else
       outside_work_ -= given.dot(body.velocity_at(arm));
   };
-  give(*row.a, impulse, row.arm_a);
-  give(*row.b, -impulse, row.arm_b);
+  give(*row.a, row.a_moves, impulse, row.arm_a);
+  give(*row.b, row.b_moves, -impulse, row.arm_b);
 }
 
 Real RigidContacts::sweep() {
@@ -67,9 +72,11 @@ Real RigidContacts::sweep() {
     const Real before = row.impulse;
     row.impulse = std::max<Real>(before + (row.wanted - row.normal.dot(relative)) / row.mobility, 0);
     const Real change = row.impulse - before;
-    largest = std::max(largest, std::abs(change) * row.mobility);
-    push(row, change * row.normal);
-    outside_work_ += change * row.recovery;
+    if (change != 0) {
+      largest = std::max(largest, std::abs(change) * row.mobility);
+      push(row, change * row.normal);
+      outside_work_ += change * row.recovery;
+    }
 
     const Real most = island_.rigid_contacts[k].friction * row.impulse;
     const Vector3 now = relative_velocity(row), slip = now - row.normal.dot(now) * row.normal;

@@ -33,9 +33,10 @@ class RigidContacts {
 
  private:
   struct Row {
-    RigidBody *a, *b;
+    RigidBody *a = nullptr, *b = nullptr;
+    bool a_moves = false, b_moves = false;
     Vector3 arm_a, arm_b, normal;
-    Real mobility, wanted, recovery;
+    Real mobility = 0, wanted = 0, recovery = 0;
     bool is_impact = false;
     Real impulse = 0;
     Vector3 friction_impulse = Vector3::Zero();
