@@ -158,6 +158,23 @@ TEST_P(SmallRigid, ACornerOfAHullInACompoundStandsOnATriangle) {
   expect_held(make, -0.2 + 0.04, Matrix3::Identity(), samples, false);
 }
 
+// A hull of one point is a ball of Bullet's margin, and so is a ball that is scaled.
+TEST_P(SmallRigid, AHullOfOnePointLiesOnATriangle) {
+  const auto make = [] {
+    auto hull = std::make_unique<btConvexHullShape>();
+    hull->addPoint(btVector3(0, 0, 0));
+    return hull;
+  };
+  expect_held(make, 0.04, Matrix3::Identity(), samples_of_capsule(0.04, 0), false);
+}
+
+TEST_P(SmallRigid, AHullOfNoPointsTouchesNothing) {
+  const btSoftBody& body = sim.add_jelly(make_box({1, 0.6, 1}, {2, 2, 2}));
+  sim.add_rigid(std::make_unique<btConvexHullShape>(), 1, {0.5, 0.6, 0.5});
+  sim.step(frame, 3);
+  EXPECT_EQ(sim.penalty().report(body).problem, "");
+}
+
 TEST_P(SmallRigid, AFastBallDoesNotPassATorus) {
   const TetMesh torus = make_torus(0.7, 0.3, 2, 18);
   for (const Real speed : {5.0, 20.0, 50.0}) {

@@ -75,8 +75,7 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
 }
 
 void RigidBodies::expect_no_others(TouchedRigidBody& touched) const {
-  if (touched.body->getNumConstraintRefs() == 0)
-    touched.start.acceleration = known_acceleration(*touched.body, gravity_applied_);
+  touched.start.acceleration = known_acceleration(*touched.body, gravity_applied_);
 }
 
 void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states) {

@@ -28,7 +28,8 @@ class RigidBodies {
   /// it.
   int touch(btCollisionObject& object, bool approached, std::vector<TouchedRigidBody>& touched) const;
 
-  /// What pushed a body without joints in the last step is among the contacts of the island: it is not expected again.
+  /// What pushed the body in the last step is among the contacts of the island, and is not expected again. Nor are joints:
+  /// they would answer to what these contacts do, and each to the other's answer.
   void expect_no_others(TouchedRigidBody& touched) const;
 
   /// Adds to the velocities what soft bodies did to them.

@@ -114,7 +114,6 @@ void detect(btBroadphasePair& pair, btCollisionDispatcher& dispatcher, std::vect
     return dispatcher.getNearCallback()(pair, dispatcher, how);
   auto* one = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
   auto* two = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
-  if (!dispatcher.needsCollision(one, two)) return;
   const btCollisionObjectWrapper of_one(nullptr, one->getCollisionShape(), one, one->getWorldTransform(), -1, -1);
   const btCollisionObjectWrapper of_two(nullptr, two->getCollisionShape(), two, two->getWorldTransform(), -1, -1);
   if (!pair.m_algorithm)
@@ -207,6 +206,7 @@ void RigidManifolds::add(std::vector<WorldIsland>& islands, const btSoftBodyWorl
       if (!done.insert(pair).second) continue;
       const std::array objects{static_cast<btCollisionObject*>(pair->m_pProxy0->m_clientObject),
                                static_cast<btCollisionObject*>(pair->m_pProxy1->m_clientObject)};
+      if (!dispatcher->needsCollision(objects[0], objects[1])) continue;
       points.clear();
       detect(*pair, *dispatcher, points);
       if (!pair->m_algorithm) continue;

@@ -112,6 +112,7 @@ void add_hull(List& list, const std::vector<btVector3>& corners, Real radius) {
   ShapeEdges& to = of_radius(list, radius);
   const auto first = static_cast<int>(to.points.size());
   for (int k = 0; k < hull.vertices.size(); ++k) add_point(to, to_vector(hull.vertices[k]));
+  if (hull.vertices.size() == 1) to.edges.push_back({first, first});
   for (int k = 0; k < hull.edges.size(); ++k) {
     const int i = hull.edges[k].getSourceVertex(), j = hull.edges[k].getTargetVertex();
     if (i < j) to.edges.push_back({first + i, first + j});

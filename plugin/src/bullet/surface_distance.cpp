@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
@@ -52,6 +53,9 @@ SurfacePoint plane_surface_point(const btStaticPlaneShape& plane, const Vector3&
 }
 
 std::optional<SurfacePoint> convex_surface_point(const btConvexShape& convex, const Vector3& point) {
+  if (convex.getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE &&
+      static_cast<const btConvexHullShape&>(convex).getNumPoints() == 0)
+    return std::nullopt;  // which Bullet would follow into nowhere
   btGjkEpaSolver2::sResults results;
   const Real distance =
       btGjkEpaSolver2::SignedDistance(to_bullet(point), 0, &convex, btTransform::getIdentity(), results);
