@@ -247,8 +247,8 @@ class Draped : public MeshSides {
         Simulation other(GetParam());
         other.set_gravity({0, -9.81, 0});
         add_mesh(other, turned ? mesh.turned() : mesh, mesh_margin).setFriction(1);
-        btSoftBody& body = add_cloth(other, 16, top + 0.1, margin);
-        for (int k = 0; k < 150; ++k) {
+        btSoftBody& body = add_cloth(other, 12, top + 0.1, margin);
+        for (int k = 0; k < 90; ++k) {
           other.step(frame);
           ASSERT_TRUE(other.penalty().report(body).finite);
           ASSERT_GT(least(body, outside), mesh_margin + margin - 2.5e-3) << "in step " << k;
@@ -285,10 +285,10 @@ TEST_P(Draped, OverTwoTriangles) {
       Simulation other(GetParam());
       other.set_gravity({0, -9.81, 0});
       add_mesh(other, turned ? sheet_mesh(half, half).turned() : sheet_mesh(half, half), mesh_margin).setFriction(1);
-      btSoftBody& body = add_cloth(other, 16, 0.1, margin);
+      btSoftBody& body = add_cloth(other, 12, 0.1, margin);
       std::vector<int> side(body.m_nodes.size(),
                             1);  // where it was last seen beside the mesh; 0: beyond its rims since
-      for (int k = 0; k < 150; ++k) {
+      for (int k = 0; k < 90; ++k) {
         other.step(frame);
         ASSERT_TRUE(other.penalty().report(body).finite);
         for (int i = 0; i < body.m_nodes.size(); ++i) {
