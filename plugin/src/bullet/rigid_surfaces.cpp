@@ -13,14 +13,6 @@ constexpr Real stretch = 1.5;        // of edges that is reckoned with
 constexpr Real negligible = 0.05;    // share of the margin that a ball may sink in between nodes
 constexpr Real padding_share = 0.5;  // of the size of a box, that is searched about it for triangles
 
-// The box in the frame of the object.
-Box localized(const Box& box, const btTransform& transform) {
-  const Matrix3 back = to_matrix(transform.getBasis()).transpose();
-  const Vector3 center = back * ((box.low + box.high) / 2 - to_vector(transform.getOrigin()));
-  const Vector3 half = back.cwiseAbs() * ((box.high - box.low) / 2);
-  return {center - half, center + half};
-}
-
 // A large ball sinks no deeper in between the nodes than l² / 6R, l the longest edge: the nodes do.
 bool are_needed(const ShapeEdges& edges, const ContactSurface& soft) {
   const Real edge = stretch * soft.longest_edge();
@@ -58,7 +50,8 @@ std::vector<SurfacePair*> RigidSurfaces::near(HeldBody& held, const btCollisionO
   std::vector<SurfacePair*> found;
   const ContactSurface& soft = surface_of(held);
   if (soft.edges().empty()) return found;
-  const Box local = localized(box, object.getWorldTransform());
+  const Matrix3 to_object = to_matrix(object.getWorldTransform().getBasis()).transpose();
+  const Box local = transformed(box, to_object, -(to_object * to_vector(object.getWorldTransform().getOrigin())));
   Object& known = refreshed(object, local);
   for (std::size_t k = 0; k < known.edges.size(); ++k) {
     if (!known.edges[k].reach_into(local) || !are_needed(known.edges[k], soft)) continue;

@@ -181,12 +181,6 @@ class Creases final : public btTriangleCallback {
   std::map<Edge, Side> edges_;
 };
 
-Box transformed(const Box& box, const Matrix3& rotation, const Vector3& origin) {
-  const Vector3 center = rotation * ((box.low + box.high) / 2) + origin;
-  const Vector3 half = rotation.cwiseAbs() * ((box.high - box.low) / 2);
-  return {center - half, center + half};
-}
-
 void append(const btCollisionShape& shape, const Box& box, List& list);
 
 void append_compound(const btCompoundShape& compound, const Box& box, List& list) {
@@ -261,6 +255,12 @@ void append_numbers(const btCollisionShape& shape, std::vector<Real>& numbers) {
 }
 
 }  // namespace
+
+Box transformed(const Box& box, const Matrix3& rotation, const Vector3& origin) {
+  const Vector3 center = rotation * ((box.low + box.high) / 2) + origin;
+  const Vector3 half = rotation.cwiseAbs() * ((box.high - box.low) / 2);
+  return {center - half, center + half};
+}
 
 bool ShapeEdges::reach_into(const Box& box) const {
   return std::any_of(edges.begin(), edges.end(), [&](const Edge& edge) {

@@ -9,6 +9,9 @@ class btCollisionShape;
 
 namespace penalty {
 
+/// The box around a box that is turned and then moved.
+Box transformed(const Box& box, const Matrix3& rotation, const Vector3& origin);
+
 /// In the frame of the shape, which reaches `radius` [m] beyond each. An edge from a corner to itself is the corner alone:
 /// the centre of a ball.
 struct ShapeEdges {

@@ -7,9 +7,6 @@
 namespace penalty {
 namespace {
 
-constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
-constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
-
 /// Side b of a contact at this instant, seen from the point of side a.
 class Opposite {
  public:

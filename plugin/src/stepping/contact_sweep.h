@@ -4,6 +4,9 @@
 
 namespace penalty {
 
+inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
+inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
+
 /// What a sweep did to energy [J], and how much it did.
 struct ContactWork {
   Real outside = 0;  // by bodies that move but take no impulse, and of taking depth back
@@ -15,8 +18,8 @@ struct ContactWork {
 /// Of the gap g and the relative normal speed u the sweep asks u >= -g/h while the gap is open and u >= 0 when it is
 /// closed: it stops approach. Depth beyond the slop of the body is taken back: there it asks u >= depth / 0.05 s, at most
 /// half a metre a second, and what that gives is work from outside. So is what driven particles give to a body that they
-/// push; two that cannot move are left alone. The impulse goes to side a and,
-/// with the opposite sign, to side b: to a rigid body at the point of a, so that both momenta are kept to round-off.
+/// push; two that cannot move are left alone. The impulse goes to side a and, with the opposite sign, to side b: to a
+/// rigid body at the point of a, so that both momenta are kept to round-off.
 /// Friction is clipped to Coulomb's cone.
 ContactWork solve_contacts(Island& island, std::size_t body, Real duration);
 

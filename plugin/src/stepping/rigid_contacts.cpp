@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
+#include "contact_sweep.h"
+
 namespace penalty {
 namespace {
 
-constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
-constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
-constexpr Real slop = 1e-4;           // depth that may stay [m]
-constexpr Real impact = 4;  // approach, relative to what accelerations make of rest, whose impulse does not come again
+constexpr Real slop = 1e-4;  // depth that may stay [m]
+constexpr Real impact = 4;   // approach, relative to what accelerations make of rest, whose impulse does not come again
 constexpr Real restitution_threshold = 0.2;  // approach that is an impact [m/s]: Bullet's
 
 }  // namespace

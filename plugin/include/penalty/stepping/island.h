@@ -110,7 +110,7 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// Advances an island over `duration` [s] and says what was done; a duration that is not positive and finite is no
 /// step.
 ///
-/// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with one sweep of contacts before each drift. At
+/// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with sweeps over the contacts before each drift. At
 /// the start and the end positions and velocities belong to the same instant, and only there, or at the end of a block
 /// of substeps, is damping applied: touched half a substep apart, it would feed the fastest modes. The number of
 /// substeps follows from the stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That limit
