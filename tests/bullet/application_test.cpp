@@ -1,4 +1,8 @@
 // What an application does to a body between steps takes effect, once.
+#include <BulletSoftBody/btSoftBodyHelpers.h>
+
+#include <functional>
+
 #include "bullet/simulation.h"
 
 namespace penalty::testing {
@@ -204,6 +208,69 @@ TEST_P(Untouched, ObjectsThatTheBodyDisabled) {
 }
 
 INSTANTIATE_TEST_SUITE_P(World, Untouched, both_worlds(), param_name);
+
+// Calls at the end of the next world step, from within it.
+void at_end_of_step(btDynamicsWorld& world, std::function<void()>& call) {
+  world.setInternalTickCallback(
+      [](btDynamicsWorld* of, btScalar) { (*static_cast<std::function<void()>*>(of->getWorldUserInfo()))(); }, &call);
+}
+
+TEST_P(Application, ARigidBodyTakenOutAtTheEndOfAStepIsLeftAlone) {
+  sim.set_gravity({0, -10, 0});
+  sim.add_ground();
+  sim.add_jelly(make_box({1, 0.5, 1}, {4, 2, 4}), {.shift = {0, 0.02, 0}});
+  btRigidBody& box = sim.add_box({0.2, 0.2, 0.2}, 1, {0.5, 0.8, 0.5});
+  box.setLinearVelocity({0, -5, 0});
+  btTransform then = box.getWorldTransform();
+  std::function<void()> take_out = [&] {
+    if (box.getLinearVelocity().y() < -4.5) return;  // it has not hit yet
+    sim.world().removeRigidBody(&box);
+    then = box.getWorldTransform();
+    take_out = [] {};
+  };
+  at_end_of_step(sim.world(), take_out);
+  sim.step(frame, 16);
+  ASSERT_FALSE(box.isInWorld());
+  EXPECT_EQ(box.getWorldTransform(), then);
+}
+
+TEST_P(Application, BodiesDeletedAtTheEndOfAStepAreForgotten) {
+  sim.set_gravity({0, -10, 0});
+  sim.add_ground();
+  btSoftBody& jelly = sim.add_jelly(make_box({1, 0.5, 1}, {4, 2, 4}), {.shift = {0, 0.02, 0}});
+  btSoftBody& other = sim.add_jelly(make_box({1, 0.5, 1}, {4, 2, 4}), {.shift = {3, 0.02, 0}});
+  btRigidBody& box = sim.add_box({0.2, 0.2, 0.2}, 1, {0.5, 0.74, 0.5});
+  int steps = 0;
+  std::function<void()> remove = [&] {
+    if (++steps != 4) return;
+    sim.remove(box);
+    sim.remove(jelly);
+  };
+  at_end_of_step(sim.world(), remove);
+  sim.step(frame, 16);
+  EXPECT_EQ(sim.world().getNumCollisionObjects(), 2);
+  EXPECT_TRUE(sim.penalty().is_attached(other));
+  EXPECT_GT(lowest(other), 0.019);
+}
+
+// Of a body that is not attached Bullet solves the constraints after that callback.
+TEST_P(Application, ASoftBodyTakenOutAtTheEndOfAStepIsLeftAlone) {
+  sim.set_gravity({0, -10, 0});
+  std::unique_ptr<btSoftBody> made(
+      btSoftBodyHelpers::CreateRope(sim.info(), btVector3(0, 0, 0), btVector3(2, 0, 0), 2, 1));
+  btSoftBody& rope = sim.add(std::move(made));
+  std::unique_ptr<btSoftBody> taken;
+  btVector3 then;
+  std::function<void()> take_out = [&] {
+    if (taken) return;
+    taken = sim.take_out(rope);
+    then = taken->m_nodes[1].m_x;
+  };
+  at_end_of_step(sim.world(), take_out);
+  sim.step(frame, 4);
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(taken->m_nodes[1].m_x, then);
+}
 
 TEST_P(Application, ARigidBodyCanBeRemovedFromUnderASoftOne) {
   sim.set_gravity({0, -9.81, 0});

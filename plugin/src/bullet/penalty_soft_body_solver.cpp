@@ -36,6 +36,11 @@ void solve_position_constraints(btSoftBody& body) {
 PenaltySoftBodySolver::PenaltySoftBodySolver() = default;
 PenaltySoftBodySolver::~PenaltySoftBodySolver() = default;
 
+void PenaltySoftBodySolver::optimize(btAlignedObjectArray<btSoftBody*>& bodies, bool force_update) {
+  of_world_ = &bodies;
+  btDefaultSoftBodySolver::optimize(bodies, force_update);
+}
+
 void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
   const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
   for (btSoftBody* body : bodies)
@@ -59,7 +64,15 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
   attached_->freeze_held(bodies);
 }
 
+// Bullet's callback at the end of a step comes before its constraints are solved, and may have deleted bodies.
+void PenaltySoftBodySolver::drop_removed() {
+  if (!of_world_) return;
+  for (int k = m_softBodySet.size() - 1; k >= 0; --k)
+    if (of_world_->findLinearSearch(m_softBodySet[k]) == of_world_->size()) m_softBodySet.removeAtIndex(k);
+}
+
 void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
+  drop_removed();
   const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
   for (btSoftBody* body : bodies) {
     if (!body->isActive()) continue;

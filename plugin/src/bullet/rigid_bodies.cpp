@@ -1,8 +1,12 @@
 #include "rigid_bodies.h"
 
+#include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include <set>
+
 #include "convert.h"
+#include "obstacles.h"
 
 namespace penalty {
 namespace {
@@ -18,6 +22,31 @@ Vector3 known_acceleration(const btRigidBody& body, bool gravity_applied) {
 Matrix3 inverse_inertia(const btRigidBody& body) {
   const Matrix3 factor = to_vector(body.getAngularFactor()).asDiagonal();
   return factor * to_matrix(body.getInvInertiaTensorWorld()) * factor;
+}
+
+// The unique ids of the proxies in a box.
+class Present final : public btBroadphaseAabbCallback {
+ public:
+  bool process(const btBroadphaseProxy* proxy) override {
+    ids.insert(proxy->m_uniqueId);
+    return true;
+  }
+  std::set<int> ids;
+};
+
+void correct(const TouchedRigidBody& t, Real duration) {
+  const Vector3 shift = t.state.position - t.start.position - duration * t.state.velocity;
+  const Vector3 turn = t.state.turn - duration * t.state.angular_velocity;
+  if (!shift.allFinite() || !turn.allFinite()) return;
+  btTransform transform = t.body->getWorldTransform();
+  transform.setOrigin(transform.getOrigin() + to_bullet(shift));
+  const Real angle = turn.norm();
+  if (angle > 1e-12)
+    transform.setRotation(
+        (btQuaternion(to_bullet(Vector3(turn / angle)), static_cast<btScalar>(angle)) * transform.getRotation())
+            .normalized());
+  t.body->setWorldTransform(transform);
+  t.body->setInterpolationWorldTransform(transform);
 }
 
 }  // namespace
@@ -70,7 +99,7 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
       if (wake) touched[k].start = start_of(object);
       return static_cast<int>(k);
     }
-  touched.push_back({body, key, start_of(object), {}});
+  touched.push_back({body, key, bounds_of(object), start_of(object), {}});
   return static_cast<int>(touched.size()) - 1;
 }
 
@@ -94,22 +123,16 @@ void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const
   }
 }
 
-void RigidBodies::correct(std::span<const TouchedRigidBody> touched, Real duration) {
-  for (const TouchedRigidBody& t : touched) {
-    if (!t.start.is_dynamic() || !t.body->isActive()) continue;  // who fell asleep was not moved
-    const Vector3 shift = t.state.position - t.start.position - duration * t.state.velocity;
-    const Vector3 turn = t.state.turn - duration * t.state.angular_velocity;
-    if (!shift.allFinite() || !turn.allFinite()) continue;
-    btTransform transform = t.body->getWorldTransform();
-    transform.setOrigin(transform.getOrigin() + to_bullet(shift));
-    const Real angle = turn.norm();
-    if (angle > 1e-12)
-      transform.setRotation(
-          (btQuaternion(to_bullet(Vector3(turn / angle)), static_cast<btScalar>(angle)) * transform.getRotation())
-              .normalized());
-    t.body->setWorldTransform(transform);
-    t.body->setInterpolationWorldTransform(transform);
-  }
+void RigidBodies::correct(std::span<const TouchedRigidBody> touched, btBroadphaseInterface& world, Real duration) {
+  Box box;
+  for (const TouchedRigidBody& t : touched)
+    if (t.start.is_dynamic() && (t.bounds.high - t.bounds.low).allFinite()) box.add(t.bounds);
+  if (!(box.high - box.low).allFinite()) return;  // none
+  Present present;
+  world.aabbTest(to_bullet(box.low), to_bullet(box.high), present);
+  for (const TouchedRigidBody& t : touched)
+    if (t.start.is_dynamic() && present.ids.contains(t.key) && t.body->isActive())  // who fell asleep was not moved
+      penalty::correct(t, duration);
 }
 
 }  // namespace penalty

@@ -4,8 +4,10 @@
 #include <unordered_map>
 #include <vector>
 
+#include "penalty/contact/box.h"
 #include "penalty/stepping/rigid_body.h"
 
+class btBroadphaseInterface;
 class btCollisionObject;
 class btRigidBody;
 
@@ -15,6 +17,7 @@ namespace penalty {
 struct TouchedRigidBody {
   btRigidBody* body;  // null: an obstacle that is no rigid body
   int key;            // unique id of its broadphase proxy
+  Box bounds;         // at the start
   RigidBody start, state;
 };
 
@@ -36,8 +39,9 @@ class RigidBodies {
   void hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states);
 
   /// Moves touched bodies from where Bullet's integration with the end velocity put them to where the sub-cycle took
-  /// them. Call after Bullet has integrated the transforms.
-  static void correct(std::span<const TouchedRigidBody> touched, Real duration);
+  /// them. Call after Bullet has integrated the transforms. Those that the world no longer has are left alone: callbacks
+  /// of the application may have deleted them.
+  static void correct(std::span<const TouchedRigidBody> touched, btBroadphaseInterface& world, Real duration);
 
  private:
   // What was expected of a rigid body after the last step: the difference is what other contacts did to it.

@@ -116,6 +116,7 @@ void AttachedBodies::World::hold_all(std::span<btSoftBody* const> listed, const 
 
 void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real duration) {
   stepped_.reserve(listed.size());
+  if (!listed.empty()) broadphase_ = listed.front()->getWorldInfo()->m_broadphase;
   for (btSoftBody* body : listed)
     if (bodies->find(*body)) wake_if_hit(*body);
   Surfaces::wake_touched(*bodies, listed, duration);
@@ -220,7 +221,11 @@ void AttachedBodies::World::thaw_held(std::span<btSoftBody* const> listed) const
 }
 
 void AttachedBodies::World::correct_rigid_bodies(Real duration) noexcept {
-  for (const WorldIsland& island : islands_) RigidBodies::correct(island.touched, duration);
+  shield(
+      [&] {
+        for (const WorldIsland& island : islands_) RigidBodies::correct(island.touched, *broadphase_, duration);
+      },
+      [](const char*) {});
   islands_.clear();
 }
 

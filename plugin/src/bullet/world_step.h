@@ -51,6 +51,7 @@ class AttachedBodies::World {
   std::vector<WorldIsland> islands_;
   Island island_;  // the one that is being advanced; keeps its memory
   std::vector<HeldBody*> stepped_;
+  btBroadphaseInterface* broadphase_ = nullptr;
 };
 
 /// The soft bodies of a world.

@@ -22,10 +22,16 @@ class PenaltySoftBodySolver : public btDefaultSoftBodySolver, public AttachedBod
   PenaltySoftBodySolver();
   ~PenaltySoftBodySolver() override;
 
+  void optimize(btAlignedObjectArray<btSoftBody*>& bodies, bool force_update = false) override;
   void predictMotion(btScalar time_step) override;
   void solveConstraints(btScalar time_step) override;
   void processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) override;
   void processCollision(btSoftBody* body, btSoftBody* other) override;
+
+ private:
+  void drop_removed();
+
+  const btAlignedObjectArray<btSoftBody*>* of_world_ = nullptr;  // which Bullet copies at the start of the step
 };
 
 }  // namespace penalty
