@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what is missing, checks the format, builds and runs all tests; then fuzzes for some seconds (tests/fuzz/run.sh) and
-# lints for two minutes (tests/tidy.sh). Works on a bare Debian 12 or 13, as root or with sudo.
+# lints for a minute (tests/tidy.sh). Works on a bare Debian 12 or 13, as root or with sudo.
 #
 #   tests/run.sh [--preset NAME] [--jobs N] [--no-install] [--tests-only] [-- CTEST_ARGUMENT...]
 #
@@ -80,4 +80,4 @@ LP_NUM_THREADS=1 ctest --preset "$preset" --parallel "$jobs" --no-tests=error "$
 step "fuzzing with sanitizers"
 bash tests/fuzz/run.sh --seconds 15 --seed 1 --jobs "$jobs"
 step "linting"
-bash tests/tidy.sh --minutes 2 --no-install --jobs "$jobs"
+bash tests/tidy.sh --minutes 1 --no-install --jobs "$jobs"

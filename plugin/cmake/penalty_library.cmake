@@ -15,6 +15,9 @@ function(penalty_library target export_name)
     INSTALL_RPATH "$ORIGIN"  # our libraries find each other
     VERSION ${PROJECT_VERSION}
     SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  # Most of the time that a source takes is Eigen's. No source may rely on it: builds with ccache go without.
+  target_precompile_headers(${target} PRIVATE <Eigen/Eigenvalues> <Eigen/Geometry> <Eigen/LU> <algorithm> <array> <map>
+                            <memory> <span> <stdexcept> <string> <vector>)
   # By value, not by linking: who uses the library need not know of them.
   target_compile_options(${target} PRIVATE $<TARGET_PROPERTY:penalty_warnings,INTERFACE_COMPILE_OPTIONS>)
 endfunction()
