@@ -127,7 +127,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     }
     // That a point will go relative to the object, left to itself.
     const auto way_of = [&](const Vector3& v, const Vector3& x) {
-      const Vector3 of_object = rigid && !rigid->isStaticObject()
+      const Vector3 of_object = rigid && !stands_still(*rigid)
                                     ? to_vector(rigid->getVelocityInLocalPoint(to_bullet(Vector3(x - origin))))
                                     : Vector3(Vector3::Zero());
       return Vector3(duration * (v - of_object + duration * stepped.gravity));

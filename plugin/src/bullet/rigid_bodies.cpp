@@ -51,6 +51,8 @@ void correct(const TouchedRigidBody& t, Real duration) {
 
 }  // namespace
 
+bool stands_still(const btRigidBody& body) { return body.isStaticObject() && !body.isKinematicObject(); }
+
 void RigidBodies::begin_step(Real duration, bool gravity_applied) {
   ++step_;
   duration_ = duration;
@@ -64,7 +66,7 @@ RigidBody RigidBodies::start_of(const btCollisionObject& object) const {
   start.position = to_vector(object.getWorldTransform().getOrigin());
   start.rotation = to_matrix(object.getWorldTransform().getBasis());
   const btRigidBody* body = btRigidBody::upcast(&object);
-  if (!body || body->isStaticObject()) return start;
+  if (!body || stands_still(*body)) return start;
   const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
   if (!is_dynamic && !body->isKinematicObject()) return start;
   start.velocity = to_vector(body->getLinearVelocity());

@@ -13,6 +13,9 @@ class btRigidBody;
 
 namespace penalty {
 
+/// Whether the body is static. Bullet's manual leaves that flag on bodies that it makes kinematic.
+bool stands_still(const btRigidBody& body);
+
 /// An object that takes part in a step.
 struct TouchedRigidBody {
   btRigidBody* body;  // null: an obstacle that is no rigid body
