@@ -1,4 +1,4 @@
-// Falling asleep and waking up. Only the deformable world lets soft bodies sleep.
+// Falling asleep and waking up.
 #include "bullet/simulation.h"
 
 #include <array>
@@ -183,7 +183,7 @@ TEST_P(SleepingTied, ABodyThatIsSwitchedOffIsNoError) {
   EXPECT_NO_THROW(sim.step(frame, 30));
 }
 
-INSTANTIATE_TEST_SUITE_P(World, SleepingTied, deformable_world(), param_name);
+INSTANTIATE_TEST_SUITE_P(World, SleepingTied, both_worlds(), param_name);
 
 // A weight on a rope swings slowly enough for Bullet to think that it rests, but hangs on a body that is awake.
 class SlowPendulum : public WorldTest {};
@@ -211,7 +211,7 @@ TEST_P(SlowPendulum, SwingsOn) {
 
 INSTANTIATE_TEST_SUITE_P(World, SlowPendulum, both_worlds(), param_name);
 
-INSTANTIATE_TEST_SUITE_P(World, Sleeping, deformable_world(), param_name);
+INSTANTIATE_TEST_SUITE_P(World, Sleeping, both_worlds(), param_name);
 
 class SleepingRigid : public WorldTest {};
 

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "face_tree.h"
 #include "penalty/math/text.h"
 #include "world_step.h"
 
@@ -66,6 +67,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
   } else {
     held = &bodies.add(body, std::move(field), options);
   }
+  keep_face_tree(body);
   return {attached_->bodies, body, held->serial};
 }
 

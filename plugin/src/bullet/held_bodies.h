@@ -40,6 +40,7 @@ struct HeldBody {
 
   // Of this step.
   StepOutcome outcome = StepOutcome::none;
+  int switched_off = 0;            // of the flags in m_cfg.collisions, within a world step
   int activation_state = 0;        // to be restored
   bool friction_is_finite = true;  // of what it touches
   int number = 0;                  // of the body in its island

@@ -2,21 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "face_tree.h"
 #include "world_step.h"
 
 namespace penalty {
 namespace {
 
-// Bullet's trees over faces and nodes serve contact between soft bodies. They take quadratic time to build, and where
-// links do not connect all nodes their construction never ends: an attached body has them only if it asks for that
-// contact.
+// As Bullet does before it predicts, but with a tree over the faces that is always made, and made in time.
 void update_constants(btSoftBody& body) {
-  if (!body.m_bUpdateRtCst) return;
-  body.m_bUpdateRtCst = false;
-  body.updateConstants();
-  body.m_fdbvt.clear();
-  if ((body.m_cfg.collisions & btSoftBody::fCollision::VF_DD) && body.m_links.size() > 0) body.initializeFaceTree();
+  if (body.m_bUpdateRtCst) {
+    body.m_bUpdateRtCst = false;
+    body.updateConstants();
+  }
+  keep_face_tree(body);
 }
 
 }  // namespace
@@ -44,7 +44,24 @@ void PenaltyDeformableBodySolver::predict_others(btScalar time_step) {
   for_each_held([](HeldBody& held) { held.body->forceActivationState(held.activation_state); });
 }
 
+// Between soft bodies that are attached there is contact already: Bullet's would add to it. It stays with its flag where a
+// body that is not attached has the flag, too.
+void PenaltyDeformableBodySolver::switch_off_soft_contact() {
+  constexpr int flag = btSoftBody::fCollision::VF_DD;
+  const std::span<btSoftBody* const> bodies = listed(m_softBodies);
+  if (std::any_of(bodies.begin(), bodies.end(), [this](const btSoftBody* body) {
+        return !is_attached(*body) && (body->m_cfg.collisions & flag) != 0;
+      }))
+    return;
+  for (btSoftBody* body : bodies)
+    if (HeldBody* held = attached_->bodies->find(*body)) {
+      held->switched_off = body->m_cfg.collisions & flag;
+      body->m_cfg.collisions &= ~flag;
+    }
+}
+
 void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
+  switch_off_soft_contact();
   const std::span<btSoftBody* const> bodies = listed(m_softBodies);
   const auto stepped = attached_->step(bodies, time_step, true);
   for (HeldBody* held : stepped) update_constants(*held->body);
@@ -78,7 +95,9 @@ void PenaltyDeformableBodySolver::applyTransforms(btScalar time_step) {
   attached_->thaw_held(bodies);
   for (btSoftBody* body : bodies) {
     HeldBody* held = attached_->bodies->find(*body);
-    if (!held || held->outcome == StepOutcome::none) continue;
+    if (!held) continue;
+    body->m_cfg.collisions |= std::exchange(held->switched_off, 0);
+    if (held->outcome == StepOutcome::none) continue;
     if (held->outcome == StepOutcome::stepped) {  // also a body that Bullet's islands have sent to sleep since then
       // The mean velocity was written, so a change of it is what contacts between soft bodies did.
       if (held->nodes.read_velocity_changes(held->stepped.particles, time_step)) held->stepped.positions_changed();

@@ -1,8 +1,8 @@
 #include "penalty/bullet/penalty_soft_body_solver.h"
 
-#include <algorithm>
-
 #include "convert.h"
+#include "face_tree.h"
+#include "sleeping.h"
 #include "world_step.h"
 
 namespace penalty {
@@ -14,13 +14,13 @@ bool has_position_constraints(const btSoftBody& body) {
   return body.m_anchors.size() > 0 || body.m_scontacts.size() > 0 || body.m_clusters.size() > 0;
 }
 
-// Bullet's tree over the faces serves its own contact with soft bodies that are not attached. Without links its
-// construction never ends.
-void predict(btSoftBody& body, bool meets_others, btScalar time_step) {
+// Without the tree over the faces that Bullet makes if it is to: ours serves as well.
+void predict(btSoftBody& body, btScalar time_step) {
   const int collisions = body.m_cfg.collisions;
-  if (!meets_others || body.m_links.size() == 0) body.m_cfg.collisions &= ~btSoftBody::fCollision::VF_SS;
+  body.m_cfg.collisions &= ~btSoftBody::fCollision::VF_SS;
   body.predictMotion(time_step);
   body.m_cfg.collisions = collisions;
+  keep_face_tree(body);
 }
 
 void solve_position_constraints(btSoftBody& body) {
@@ -46,8 +46,6 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
   for (btSoftBody* body : bodies)
     if (!is_attached(*body) && body->isActive()) body->predictMotion(time_step);
 
-  const bool meets_others =
-      std::any_of(bodies.begin(), bodies.end(), [this](const btSoftBody* body) { return !is_attached(*body); });
   for (HeldBody* held : attached_->step(bodies, time_step, false)) {
     btSoftBody& body = *held->body;
     Particles& particles = held->stepped.particles;
@@ -56,7 +54,7 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
     // Bullet's prediction keeps its bounds and trees, which are to follow the mean velocity; gravity it adds itself.
     const Vector3 gravity_dv = to_vector(body.getWorldInfo()->m_gravity) * Real(body.m_cfg.timescale * time_step);
     held->nodes.write_mean_velocities(particles, held->stepped.start.positions, time_step, gravity_dv);
-    predict(body, meets_others, time_step);
+    predict(body, time_step);
     // A start position from which the end velocity leads to the end position: whatever Bullet's position constraints
     // then do arrives as a change of that velocity.
     held->nodes.write(particles, body.m_sst.sdt);
@@ -75,8 +73,9 @@ void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
   drop_removed();
   const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
   for (btSoftBody* body : bodies) {
-    if (!body->isActive()) continue;
     HeldBody* held = attached_->bodies->find(*body);
+    if (held && body->getActivationState() == ISLAND_SLEEPING) body->setZeroVelocity();
+    if (!body->isActive()) continue;
     if (!held) {
       body->solveConstraints();
     } else if (held->outcome != StepOutcome::held && has_position_constraints(*body)) {
@@ -84,6 +83,7 @@ void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
       held->nodes.positions_to_velocities(body->m_sst.isdt);
       attached_->read_solved(*held);
     }
+    if (held) update_activation(*held, time_step);
   }
   attached_->thaw_held(bodies);
   attached_->correct_rigid_bodies(time_step);

@@ -30,6 +30,20 @@ bool is_restless(const btCollisionObject& object) {
 
 }  // namespace
 
+void update_activation(HeldBody& held, Real duration) {
+  btSoftBody& body = *held.body;
+  if (held.outcome == StepOutcome::stepped) {
+    const PackedVectors& now = held.stepped.particles.positions;
+    Real furthest2 = 0;
+    for (int i = 0; i < held.stepped.particles.size(); ++i)
+      furthest2 = std::max(furthest2, (now.col(i) - held.start.col(i)).squaredNorm());
+    body.m_maxSpeedSquared = static_cast<btScalar>(furthest2 / (duration * duration));
+  }
+  body.updateDeactivation(static_cast<btScalar>(duration));
+  if (body.getActivationState() == DISABLE_DEACTIVATION || body.getActivationState() == DISABLE_SIMULATION) return;
+  body.setActivationState(body.wantsSleeping() ? WANTS_DEACTIVATION : ACTIVE_TAG);
+}
+
 void wake_if_hit(btSoftBody& body) {
   // After a step of a duration that is no number.
   if (!std::isfinite(body.getDeactivationTime())) body.setDeactivationTime(0);
@@ -39,7 +53,7 @@ void wake_if_hit(btSoftBody& body) {
   const Real margin = body.getCollisionShape()->getMargin();
   for (btCollisionObject* object : obstacles_near(body, box, margin)) {
     const btRigidBody* rigid = btRigidBody::upcast(object);
-    if (!rigid || !rigid->isActive() || rigid->isStaticObject()) continue;
+    if (!rigid || !rigid->isActive() || stands_still(*rigid)) continue;
     if (Real(rigid->getLinearVelocity().length()) > waking_speed && bounds_of(*object).overlaps(box, 2 * margin))
       body.activate(true);
   }

@@ -11,10 +11,15 @@ namespace penalty {
 class Couplings;
 class HeldBodies;
 class Surfaces;
+struct HeldBody;
 struct WorldIsland;
 
 /// Slower than this [m/s], touching does not wake what sleeps.
 inline constexpr Real waking_speed = 0.1;
+
+/// An active soft body at rest for long enough is ready to sleep, as Bullet's deformable world has it; its classic world
+/// leaves soft bodies, and all that touches them, awake for ever. `duration`: of the step that it has made [s].
+void update_activation(HeldBody& held, Real duration);
 
 /// A sleeping soft body wakes when something that moves comes near.
 void wake_if_hit(btSoftBody& body);

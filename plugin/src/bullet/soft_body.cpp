@@ -7,6 +7,7 @@
 #include <string>
 
 #include "convert.h"
+#include "face_tree.h"
 #include "penalty/math/text.h"
 
 namespace penalty {
@@ -101,6 +102,7 @@ std::unique_ptr<btSoftBody> assemble(btSoftBodyWorldInfo& world_info, const Eige
   body->m_cfg.kDF = static_cast<btScalar>(options.friction);
   body->m_cfg.collisions = options.stock_deformable ? btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN
                                                     : btSoftBody::fCollision::SDF_RS;
+  keep_face_tree(*body);
   return body;
 }
 

@@ -33,6 +33,7 @@ class PenaltyDeformableBodySolver : public btDeformableBodySolver, public Attach
  private:
   bool all_attached() const;
   void predict_others(btScalar time_step);
+  void switch_off_soft_contact();
 };
 
 }  // namespace penalty
