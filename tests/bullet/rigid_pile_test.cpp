@@ -69,6 +69,20 @@ TEST_P(RigidPile, TenKilogramsOnHalfAKilogramOnASoftBox) {
   expect_to_stand(body, {&lower, &sim.add_box(half, 10, {0.5, 0.971, 0.5})}, half);
 }
 
+TEST_P(RigidPile, TenKilogramsOnHalfAKilogramStayWhereTheyAre) {
+  add_soft_box(0.021);
+  btRigidBody& lower = sim.add_box({0.15, 0.1, 0.15}, 0.5, {0.5, 0.751, 0.5});
+  btRigidBody& upper = sim.add_box({0.15, 0.1, 0.15}, 10, {0.5, 0.971, 0.5});
+  const auto offset = [](const btRigidBody& body) {
+    const btVector3& x = body.getWorldTransform().getOrigin();
+    return std::hypot(Real(x.x()) - 0.5, Real(x.z()) - 0.5);
+  };
+  sim.step(frame, 600);
+  EXPECT_LT(offset(lower), 0.005);
+  EXPECT_LT(offset(upper), 0.005);
+  EXPECT_LT(Real(upper.getAngularVelocity().length()), 0.02) << "and does not rock";
+}
+
 TEST_P(RigidPile, TwoTimesTenKilogramsOnATorusOfOne) {
   const btSoftBody& body = add_torus();
   btRigidBody& lower = sim.add_box({1.2, 0.15, 1.2}, 10, {0, 0.8, 0});

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "contact_sweep.h"
 #include "coupling.h"
 #include "energy_guard.h"
+#include "particle_contacts.h"
 #include "rigid_contacts.h"
 #include "stepped_body.h"
 #include "surface_contacts.h"
@@ -14,13 +14,14 @@
 namespace penalty {
 namespace {
 
-constexpr int most_blocks = 8;           // of substeps, after each of which there is damping and plastic flow
-constexpr Real retry_growth = 1.5;       // substeps of a repeated step
-constexpr int most_rigid_sweeps = 50;    // of a substep; they end when one changes speeds by less than
-constexpr Real rigid_tolerance = 1e-3;   // this share of the first,
-constexpr Real rigid_negligible = 0.05;  // or of what accelerations make of them
-constexpr int fewest_on_held = 8;        // substeps where a rigid body may lie on points that are held
-constexpr Real substep_memory = 0.8;     // share of the last step's substeps that the next one starts from
+constexpr int most_blocks = 8;             // of substeps, after each of which there is damping and plastic flow
+constexpr Real retry_growth = 1.5;         // substeps of a repeated step
+constexpr int most_sweeps = 50;            // of a substep; they end when one changes speeds by less than
+constexpr Real rigid_tolerance = 1e-3;     // this share of the first, between rigid bodies,
+constexpr Real particle_tolerance = 1e-2;  // this with soft ones,
+constexpr Real negligible = 0.2;           // or of what accelerations make of them
+constexpr int fewest_on_held = 8;          // substeps where a rigid body may lie on points that are held
+constexpr Real substep_memory = 0.8;       // share of the last step's substeps that the next one starts from
 
 // v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
 // over the particles.
@@ -52,8 +53,9 @@ bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupl
 class SubCycle {
  public:
   SubCycle(Island& island, SurfaceContacts& surfaces, Real duration)
-      : island_(island), surfaces_(surfaces), rigid_contacts_(island), duration_(duration) {
-    has_contacts_ = !island.contacts.empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
+      : island_(island), surfaces_(surfaces), rigid_contacts_(island), particle_contacts_(island), duration_(duration) {
+    has_contacts_ = !particle_contacts_.is_empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
+    are_coupled_ = !rigid_contacts_.is_empty() || particle_contacts_.are_coupled();
     for (const SteppedBody* body : island_.bodies) {
       has_blocks_ = has_blocks_ || damps(*body) || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
@@ -71,6 +73,7 @@ class SubCycle {
     const Real h = duration_ / (blocks * per_block);
     outside_work_ = since_contacts_ = 0;
     rigid_contacts_.begin_attempt();
+    particle_contacts_.begin_attempt();
     remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) body->step_flows = {};
     for (int block = 0; block < blocks; ++block) {
@@ -91,7 +94,7 @@ class SubCycle {
   }
 
   Real outside_work() const {
-    return outside_work_ + rigid_contacts_.outside_work();
+    return outside_work_ + rigid_contacts_.outside_work() + particle_contacts_.outside_work();
   }  // of obstacles, of driven particles, of taking depth back [J]
 
  private:
@@ -119,17 +122,12 @@ class SubCycle {
 
   // Once over the contacts with and between rigid bodies; returns whether that is to be done again.
   bool sweep(Real h) {
-    Real change = rigid_contacts_.sweep();
-    for (std::size_t k = 0; k < island_.bodies.size(); ++k) {
-      const ContactWork work = penalty::solve_contacts(island_, k, h);
-      outside_work_ += work.outside;
-      island_.bodies[k]->step_flows.contact_loss += work.loss;
-      change = std::max(change, work.change);
-    }
-    if (rigid_contacts_.is_empty()) return false;
-    if (rigid_sweeps_ == 0) first_change_ = change;
-    return ++rigid_sweeps_ < most_rigid_sweeps && change > rigid_tolerance * first_change_ &&
-           change > rigid_negligible * rigid_contacts_.acceleration() * h;
+    const Real of_rigid = rigid_contacts_.sweep(), of_particles = particle_contacts_.sweep();
+    if (!are_coupled_) return false;
+    const Real change = std::max(of_rigid, of_particles);
+    if (sweeps_ == 0) first_change_ = change;
+    return ++sweeps_ < most_sweeps && change > negligible * rigid_contacts_.acceleration() * h &&
+           (of_rigid > rigid_tolerance * first_change_ || of_particles > particle_tolerance * first_change_);
   }
 
   void converge(Real h) {
@@ -143,10 +141,12 @@ class SubCycle {
   template <class Solve>
   void solve_contacts(Real kick_time, Real h, const Solve& solve) {
     for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
-    rigid_sweeps_ = 0;
+    sweeps_ = 0;
     rigid_contacts_.begin(h, since_contacts_);
+    particle_contacts_.begin(h);
     solve();
     rigid_contacts_.end(since_contacts_);
+    particle_contacts_.end();
     since_contacts_ = 0;
     for (SteppedBody* body : island_.bodies) {
       const Particles& particles = body->particles;
@@ -218,11 +218,12 @@ class SubCycle {
   Island& island_;
   SurfaceContacts& surfaces_;
   RigidContacts rigid_contacts_;
+  ParticleContacts particle_contacts_;
   Real duration_, remaining_ = 0;
   Real since_contacts_ = 0;  // time of the kicks since contacts were solved [s]
   Real first_change_ = 0;    // of a normal speed by the first sweep [m/s]
-  int rigid_sweeps_ = 0;
-  bool has_contacts_ = false, has_blocks_ = false, has_driven_particles_ = false;
+  int sweeps_ = 0;
+  bool has_contacts_ = false, are_coupled_ = false, has_blocks_ = false, has_driven_particles_ = false;
   Real outside_work_ = 0;
 };
 
@@ -251,17 +252,22 @@ Real constant_force_work(Island& island) {
   return work;
 }
 
-bool may_touch(const Island& island, const SurfaceContacts& surfaces, std::size_t body) {
-  return is_in_contact(island, body) || surfaces.may_touch(body);
+// Which of the bodies may touch something in the step.
+std::vector<char> touching(const Island& island, const SurfaceContacts& surfaces) {
+  std::vector<char> touch(island.bodies.size());
+  for (std::size_t k = 0; k < touch.size(); ++k) touch[k] = surfaces.may_touch(k);
+  for (const Contact& contact : island.contacts)
+    for (const Side* side : {&contact.a, &contact.b})
+      if (!side->is_rigid()) touch[side->body] = true;
+  return touch;
 }
 
 // What holds a body up against a constant acceleration a takes a h from it after each kick of a substep h: energy is
 // then defined no better than the work over that speed, whatever the state. [J s], to be multiplied with h.
-Real contact_noise_rate(const Island& island, const SurfaceContacts& surfaces, Real duration) {
+Real contact_noise_rate(const Island& island, const std::vector<char>& touch, Real duration) {
   Real rate = 0;
   for (std::size_t k = 0; k < island.bodies.size(); ++k)
-    if (may_touch(island, surfaces, k))
-      rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
+    if (touch[k]) rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
   for (const RigidBody& body : island.rigid_bodies)
     for (int axis = 0; axis < 3; ++axis)
       rate += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] * body.acceleration[axis] * duration;
@@ -292,7 +298,8 @@ void report_contacts(const Island& island) {
   }
 }
 
-int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
+int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, const std::vector<char>& touch,
+                    Real duration) {
   int substeps = surfaces.least_substeps();
   // It ends a step half a substep's fall too fast, whatever holds it.
   if (std::any_of(island.contacts.begin(), island.contacts.end(), [&](const Contact& contact) {
@@ -307,7 +314,7 @@ int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real 
     const SteppedBody& body = *island.bodies[k];
     int wanted = body.options.substeps;
     if (wanted == 0) {
-      const Real safety = may_touch(island, surfaces, k) ? body.options.contact_safety : body.options.safety;
+      const Real safety = touch[k] ? body.options.contact_safety : body.options.safety;
       const Real limit = duration * std::sqrt(body.largest_eigenvalue + coupling_eigenvalue) / 2 / safety;
       wanted = limit < body.options.max_substeps ? static_cast<int>(std::ceil(limit)) : body.options.max_substeps;
     }
@@ -339,7 +346,8 @@ void advance_explicitly(Island& island, Real duration) {
   const Real start_energy = energy(island);
   SurfaceContacts surfaces(island);
   surfaces.begin_step(duration);
-  const Real contact_noise = contact_noise_rate(island, surfaces, duration) * duration;
+  const std::vector<char> touch = touching(island, surfaces);
+  const Real contact_noise = contact_noise_rate(island, touch, duration) * duration;
 
   SubCycle cycle(island, surfaces, duration);
   const auto attempt = [&](int substeps) {
@@ -352,7 +360,7 @@ void advance_explicitly(Island& island, Real duration) {
         .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / taken};
   };
   const GuardedStep step =
-      guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
+      guard_energy(wanted_substeps(island, surfaces, touch, duration), start_energy,
                    {.most_substeps = most_substeps, .factor = retry_growth, .increment = 1, .forgives_outside = true},
                    attempt, [&] { undo(island, surfaces); });
 

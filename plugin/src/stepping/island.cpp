@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact_sweep.h"
 #include "explicit_step.h"
 #include "implicit_step.h"
 #include "surface_contacts.h"
@@ -56,7 +55,6 @@ StepReport report_of(const Island& island) {
 
 StepReport advance(Island& island, Real duration) {
   if (island.bodies.empty() || !(duration > 0) || !std::isfinite(duration)) return {};
-  sort_contacts(island);
   if (steps_implicitly(island, duration))
     advance_implicitly(*island.bodies.front(), duration);
   else

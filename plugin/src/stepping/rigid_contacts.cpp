@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "contact_sweep.h"
+#include "particle_contacts.h"
 
 namespace penalty {
 namespace {

@@ -6,7 +6,7 @@ namespace penalty {
 
 /// Sequential impulses on the velocities of a substep, summed and clipped contact by contact: E. Catto, Iterative Dynamics
 /// with Temporal Coherence (2005). Of the gap g and the relative normal speed u each asks u >= -g/h while the gap is open,
-/// u >= 0 when it is closed; depth comes back as in solve_contacts. Both bodies take the impulse at the same point, so both
+/// u >= 0 when it is closed; depth comes back as in ParticleContacts. Both bodies take the impulse at the same point, so both
 /// momenta are kept. Friction is clipped to Coulomb's cone.
 class RigidContacts {
  public:

@@ -19,8 +19,8 @@ constexpr int fewest_substeps = 16;     // of a step in which surfaces are near
 constexpr Real least_mobility = 1e-6;   // that is left without turning, relative to that with it
 constexpr int most_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
-constexpr Real relative_tolerance = 0.1;  // and by no more than that of the first,
-constexpr Real negligible = 1e-5;         // unless it is this small
+constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
+constexpr Real negligible = 3e-4;         // unless it is this small
 
 Eigen::Map<Vector3> vector(Real* p) { return Eigen::Map<Vector3>(p); }
 Eigen::Map<const Vector3> vector(const Real* p) { return Eigen::Map<const Vector3>(p); }
@@ -286,6 +286,11 @@ bool SurfaceContacts::converge(Real h, const RigidSweep& rigid_sweep) {
   }
   for (int sweep = 0; rigid_sweep() && sweep < most_sweeps; ++sweep) {
   }
+  for (const TouchingPair& pair : scratch_.pairs) {
+    if (pair.gap > 0 || pair.given == 0) continue;
+    const Real excess = pair.normal.dot(relative_velocity(pair)) - wanted_speed(pair, h);
+    if (excess > 0) outside_work_ += excess * pair.given;  // lost thickness that comes back faster than was asked
+  }
   return changed || !island_.contacts.empty() || !island_.rigid_contacts.empty();
 }
 
@@ -326,6 +331,12 @@ void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3
     outside_work_ -= given.dot(pair.rigid->velocity_at(pair.arm));
 }
 
+Real SurfaceContacts::wanted_speed(const TouchingPair& pair, Real h) {
+  if (pair.gap >= 0) return -pair.gap / h;
+  return std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
+                          pair.leads_out ? exit_speed : recovery_speed);
+}
+
 // Returns the largest change of a distance in the drift, relative to its thickness.
 Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
   Real worst = 0;
@@ -333,29 +344,25 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
     const Vector3 velocity = relative_velocity(pair);
     const Vector3 turn = pair.leads_out && !pair.rigid ? turn_of(pair, pair.normal) : Vector3(Vector3::Zero());
     const Real speed = pair.normal.dot(velocity) - turn.dot(spin_of(pair, turn));
-    Real wanted = -pair.gap / h;
-    if (wanted > 0)
-      wanted = std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
-                                pair.leads_out ? exit_speed : recovery_speed);
-    if (speed >= wanted) continue;
+    const Real wanted = wanted_speed(pair, h);
+    if (speed >= wanted && pair.given == 0) continue;
     const Real mobility = pair.mobility - pair.difference.cross(pair.normal).dot(turn);
     if (!(mobility > least_mobility * pair.mobility)) continue;
-    Real impulse = (wanted - speed) / mobility;
-    if (pair.leads_out) {
-      impulse = std::min(impulse, exit_acceleration * h / mobility - pair.given);
-      if (!(impulse > 0)) continue;
-      pair.given += impulse;
-    }
+    Real given = std::max<Real>(pair.given + (wanted - speed) / mobility, 0);
+    if (pair.leads_out) given = std::min(given, exit_acceleration * h / mobility);
+    const Real impulse = given - pair.given;
+    if (impulse == 0) continue;
+    pair.given = given;
     const Real reached = speed + impulse * mobility;
     hit = true;
-    worst = std::max(worst, (reached - speed) * h / pair.thickness);
+    worst = std::max(worst, std::abs(reached - speed) * h / pair.thickness);
     push(pair, impulse, pair.normal, turn);
-    const Real recovery = std::max<Real>(impulse * reached, 0);  // as of a surface that moves so fast
+    const Real recovery = impulse * std::clamp<Real>(reached, 0, std::max<Real>(wanted, 0));  // as of a surface so fast
     outside_work_ += recovery;
     const Real loss = recovery - impulse * (speed + reached) / 2;
     island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
     island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
-    if (pair.friction > 0 && !pair.leads_out) rub(pair, impulse, velocity - speed * pair.normal);
+    if (pair.friction > 0 && !pair.leads_out) rub(pair, velocity - speed * pair.normal);
   }
   return worst;
 }
@@ -384,7 +391,7 @@ void SurfaceContacts::find_inertia(TouchingPair& pair) const {
 
 // A pinned particle and a rigid body take up any moment; particles in one line have none about it to speak of, and no
 // friction.
-void SurfaceContacts::rub(TouchingPair& pair, Real normal_impulse, Vector3 slip) {
+void SurfaceContacts::rub(TouchingPair& pair, Vector3 slip) {
   Vector3 turn = Vector3::Zero();
   if (!pair.rigid) {
     if (!pair.has_inertia) find_inertia(pair);
@@ -396,21 +403,30 @@ void SurfaceContacts::rub(TouchingPair& pair, Real normal_impulse, Vector3 slip)
       return;
     }
   }
-  constexpr Real no_slip = 1e-12;
-  const Real slip_speed = slip.norm();
-  if (!(slip_speed > no_slip)) return;
-  const Vector3 direction = slip / slip_speed;
-  Real mobility = pair.soft_mobility;
-  if (pair.rigid) {
-    mobility += pair.rigid->mobility_at(pair.arm, direction);
-  } else {
+  // The impulse that stops the slip, and from there back into the cone.
+  const auto mobility_along = [&](const Vector3& direction) {
+    if (pair.rigid) return pair.soft_mobility + pair.rigid->mobility_at(pair.arm, direction);
     turn = turn_of(pair, direction);
-    mobility -= pair.difference.cross(direction).dot(turn);
+    return pair.soft_mobility - pair.difference.cross(direction).dot(turn);
+  };
+  constexpr Real no_slip = 1e-12;
+  Vector3 rubbed = pair.rubbed;
+  if (const Real slip_speed = slip.norm(); slip_speed > no_slip) {
+    const Real mobility = mobility_along(slip / slip_speed);
+    if (!(mobility > least_mobility * pair.mobility)) return;
+    rubbed -= slip / mobility;
   }
+  const Real size = rubbed.norm(), most = pair.friction * pair.given;
+  if (size > most) rubbed *= most / size;
+  const Vector3 change = rubbed - pair.rubbed;
+  const Real impulse = change.norm();
+  if (impulse == 0) return;
+  const Vector3 direction = change / impulse;
+  const Real mobility = mobility_along(direction);
   if (!(mobility > least_mobility * pair.mobility)) return;
-  const Real impulse = std::min(pair.friction * normal_impulse, slip_speed / mobility);
-  push(pair, -impulse, direction, turn);
-  const Real loss = impulse * (slip_speed - impulse * mobility / 2);
+  pair.rubbed = rubbed;
+  push(pair, impulse, direction, turn);
+  const Real loss = -impulse * (direction.dot(slip) + impulse * mobility / 2);
   island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
   island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
 }

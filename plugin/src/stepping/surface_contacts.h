@@ -17,12 +17,13 @@ struct TouchingPair {
   Real mobility = 0;                     // of an impulse along the normal [1/kg],
   Real soft_mobility = 0;                // and of the particles alone
   Real friction = 0;
-  Real given = 0;                 // to lead it out, so far in this substep [N s]
-  bool leads_out = false;         // out of a closed surface that the first feature, a point, is inside of
-  int body_a = 0, body_b = 0;     // half of what is lost is booked to each
-  RigidBody* rigid = nullptr;     // one of the features is fixed in it, and takes
-  Real rigid_weight = 0;          // so much of an impulse: 1 the first, -1 the second,
-  Vector3 arm = Vector3::Zero();  // where the other one is, from its centre [m]
+  Real given = 0;                    // along the normal, so far in this drift [N s],
+  Vector3 rubbed = Vector3::Zero();  // and across it
+  bool leads_out = false;            // out of a closed surface that the first feature, a point, is inside of
+  int body_a = 0, body_b = 0;        // half of what is lost is booked to each
+  RigidBody* rigid = nullptr;        // one of the features is fixed in it, and takes
+  Real rigid_weight = 0;             // so much of an impulse: 1 the first, -1 the second,
+  Vector3 arm = Vector3::Zero();     // where the other one is, from its centre [m]
 
   // What friction needs, found when it is needed first: see SurfaceContacts::rub.
   bool has_inertia = false, is_held = false, can_turn = false;
@@ -117,11 +118,12 @@ class SurfaceContacts {
   void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
   void lead_out(const SurfaceContact& contact);
+  static Real wanted_speed(const TouchingPair& pair, Real h);
   Real sweep_pairs(Real h, bool& hit);
   Vector3 turn_of(TouchingPair& pair, const Vector3& direction) const;
   Vector3 spin_of(const TouchingPair& pair, const Vector3& turn) const;
   void push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn);
-  void rub(TouchingPair& pair, Real normal_impulse, Vector3 slip);
+  void rub(TouchingPair& pair, Vector3 slip);
   void find_inertia(TouchingPair& pair) const;
   Vector3 relative_velocity(const TouchingPair& pair) const;
 

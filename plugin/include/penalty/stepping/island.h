@@ -88,13 +88,12 @@ struct Island {
   std::vector<SteppedBody*> bodies = {};
   std::vector<RigidBody> rigid_bodies = {};
   std::vector<Coupling*> couplings = {};
-  std::vector<Contact> contacts = {};  // of this step; `advance` puts them in the order of the bodies of their sides a
+  std::vector<Contact> contacts = {};  // of this step
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
 
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};
-  std::vector<std::size_t> contacts_begin = {};  // of the contacts of each body, and their end
   std::shared_ptr<SurfaceScratch> surface_scratch = {};
 };
 

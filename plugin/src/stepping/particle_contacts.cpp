@@ -1,0 +1,178 @@
+#include "particle_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace penalty {
+namespace {
+
+constexpr int most_held_passes = 30;   // in a sweep; they end when one changes no speed by more than
+constexpr Real held_tolerance = 1e-5;  // this share of what the first did
+
+// What an impulse on the point gives to whoever drives the particles of it that are held [J].
+Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles) {
+  Real work = 0;
+  for (int k = 0; k < point.size; ++k)
+    if (const int i = point.particles[k]; particles.inverse_masses[i] == 0)
+      work += point.weights[k] * impulse.dot(particles.velocities.col(i).head<3>());
+  return work;
+}
+
+bool has_held_particle(const WeightedPoint& point, const Particles& particles) {
+  for (int k = 0; k < point.size; ++k)
+    if (particles.inverse_masses[point.particles[k]] == 0) return true;
+  return false;
+}
+
+}  // namespace
+
+Vector3 ParticleContacts::Row::velocity_of_other() const {
+  return rigid ? rigid->velocity_at(arm) : contact->b.point.of(other->particles.velocities);
+}
+
+Real ParticleContacts::Row::mobility_of_other(const Vector3& direction) const {
+  return rigid ? rigid->mobility_at(arm, direction) : other_mobility * direction.squaredNorm();
+}
+
+bool ParticleContacts::are_coupled() const {
+  return std::any_of(island_.contacts.begin(), island_.contacts.end(), [&](const Contact& contact) {
+    return !contact.b.is_rigid() || island_.rigid_bodies[contact.b.rigid].is_dynamic();
+  });
+}
+
+void ParticleContacts::begin(Real h) {
+  rows_.clear();
+  rows_.reserve(island_.contacts.size());
+  has_held_ = false;
+  for (Contact& contact : island_.contacts) {
+    Row row;
+    row.contact = &contact;
+    row.body = island_.bodies[contact.a.body];
+    const Particles& particles = row.body->particles;
+    const WeightedPoint& point = contact.a.point;
+    const Vector3 x = point.of(particles.positions);
+    Vector3 offset;
+    if (contact.b.is_rigid()) {
+      row.rigid = &island_.rigid_bodies[contact.b.rigid];
+      row.arm = x - row.rigid->position;
+      row.normal = row.rigid->rotation * contact.normal;
+      row.is_obstacle = !row.rigid->is_dynamic();
+      offset = row.arm - row.rigid->rotation * contact.b.anchor;
+    } else {
+      row.other = island_.bodies[contact.b.body];
+      row.normal = contact.normal;
+      row.other_mobility = contact.b.point.mobility(row.other->particles.inverse_masses);
+      row.is_obstacle = row.other_mobility <= 0;
+      offset = x - contact.b.point.of(row.other->particles.positions);
+    }
+    contact.impulse.setZero();
+    row.point_mobility = point.mobility(particles.inverse_masses);
+    if (row.is_held() && row.is_obstacle) continue;
+    has_held_ = has_held_ || row.is_held();
+    row.is_driven = has_held_particle(point, particles);
+    if (contact.radius > 0 && !offset.isZero(0)) row.normal = offset.normalized();
+    const Real gap = row.normal.dot(offset) - contact.radius;
+    contact.depth = std::max(contact.depth, -gap);
+    row.recovery =
+        std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
+    row.wanted = gap > 0 ? -gap / h : row.recovery;
+    row.normal_mobility = row.point_mobility + (row.is_obstacle ? 0 : row.mobility_of_other(row.normal));
+    rows_.push_back(row);
+  }
+  if (has_held_) share_among_held();
+}
+
+// What it should have been given.
+Vector3 ParticleContacts::impulse_of(const Row& row, const Vector3& relative) const {
+  const Real speed = row.normal.dot(relative), given = row.normal.dot(row.impulse);
+  const Real pressed = std::max<Real>(given + (row.wanted - speed) / row.normal_mobility, 0);
+  if (pressed == 0) return Vector3::Zero();
+  Vector3 rubbed = row.impulse - given * row.normal;
+  const Vector3 slip = relative - speed * row.normal;
+  if (const Real slip_speed = slip.norm(); row.contact->friction > 0 && slip_speed > 1e-12) {
+    const Real mobility = row.is_obstacle ? 0 : row.mobility_of_other(slip / slip_speed);
+    rubbed -= slip / (row.point_mobility + mobility);
+  }
+  const Real size = rubbed.norm(), most = row.contact->friction * pressed;
+  if (size > most) rubbed *= most / size;
+  return pressed * row.normal + rubbed;
+}
+
+// Returns the change of its normal speed [m/s].
+Real ParticleContacts::give(Row& row, const Vector3& impulse) {
+  const Vector3 change = impulse - row.impulse;
+  Particles& particles = row.body->particles;
+  const WeightedPoint& point = row.contact->a.point;
+  const Vector3 of_other = row.velocity_of_other();
+  const Vector3 relative = point.of(particles.velocities) - of_other;
+  const Real along = row.normal.dot(change);
+  const Real recovery = along * row.recovery;  // as of an obstacle that moves so fast
+  const Real mobility =
+      row.point_mobility * change.squaredNorm() + (row.is_obstacle ? 0 : row.mobility_of_other(change));
+  row.body->step_flows.contact_loss += recovery - change.dot(relative) - mobility / 2;
+  outside_work_ += recovery;
+  if (row.is_driven) outside_work_ -= driving_work(point, change, particles);
+  if (!row.is_held()) point.add_push(change, particles.inverse_masses, particles.velocities);
+  if (row.is_obstacle)
+    outside_work_ += change.dot(of_other);
+  else if (row.rigid)
+    row.rigid->push(-change, row.arm);
+  else
+    row.contact->b.point.add_push(-change, row.other->particles.inverse_masses, row.other->particles.velocities);
+  row.impulse = impulse;
+  return std::abs(along) * row.normal_mobility;
+}
+
+Real ParticleContacts::update(Row& row) {
+  const Vector3 relative = row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other();
+  const Vector3 impulse = impulse_of(row, relative);
+  return impulse == row.impulse ? 0 : give(row, impulse);
+}
+
+Real ParticleContacts::sweep() {
+  Real largest = 0;
+  for (Row& row : rows_)
+    if (!row.is_held()) largest = std::max(largest, update(row));
+  return has_held_ ? std::max(largest, settle_held()) : largest;
+}
+
+// Nothing gives way at points that are held: pushed off one by one, what lies on many of them would spin and hop. They
+// begin with what each would give alone, divided by their number.
+void ParticleContacts::share_among_held() {
+  std::vector<Vector3> alone(rows_.size(), Vector3::Zero());
+  Real number = 0;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Row& row = rows_[k];
+    if (!row.is_held()) continue;
+    alone[k] = impulse_of(row, row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other());
+    number += !alone[k].isZero(0);
+  }
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    if (!alone[k].isZero(0)) give(rows_[k], alone[k] / number);
+}
+
+// Forth and back until nothing changes.
+Real ParticleContacts::settle_held() {
+  Real first = 0;
+  for (int pass = 0; pass < most_held_passes; ++pass) {
+    Real largest = 0;
+    for (std::size_t k = 0; k < rows_.size(); ++k)
+      if (Row& row = rows_[pass % 2 == 0 ? k : rows_.size() - 1 - k]; row.is_held())
+        largest = std::max(largest, update(row));
+    if (pass == 0) first = largest;
+    if (largest <= held_tolerance * first) break;
+  }
+  return first;
+}
+
+void ParticleContacts::end() {
+  for (const Row& row : rows_) {
+    row.contact->impulse = row.impulse;
+    if (row.wanted < 0 || row.impulse.isZero(0)) continue;  // what was open, or pushed nothing
+    const Vector3 relative = row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other();
+    const Real excess = row.normal.dot(relative) - row.wanted;
+    if (excess > 0) outside_work_ += excess * row.normal.dot(row.impulse);
+  }
+}
+
+}  // namespace penalty

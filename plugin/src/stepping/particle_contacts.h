@@ -1,0 +1,73 @@
+// Contacts of particles, and of points between them, with rigid bodies and with each other.
+#pragma once
+#include "penalty/stepping/island.h"
+
+namespace penalty {
+
+inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
+inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
+
+/// One-sided constraints on velocities, met by sequential impulses that are summed and clipped contact by contact, as
+/// those of RigidContacts: a sweep may take back what an earlier one gave too much. Of the gap g and the relative normal
+/// speed u a contact asks u >= -g/h while the gap is open and u >= 0 when it is closed: it stops approach. Depth beyond
+/// the slop of the body is taken back: there it asks u >= depth / 0.05 s, at most half a metre a second, and what that
+/// gives is work from outside. So is what driven particles give to a body that they push; two that cannot move are left
+/// alone. The impulse goes to side a and, with the opposite sign, to side b: to a rigid body at the point of a, so that
+/// both momenta are kept to round-off. Friction is clipped to Coulomb's cone.
+class ParticleContacts {
+ public:
+  explicit ParticleContacts(Island& island) : island_(island) {}
+
+  bool is_empty() const { return island_.contacts.empty(); }
+
+  /// What one of them gives may change what another one needs: one sweep is not enough.
+  bool are_coupled() const;
+
+  /// Before the sweeps of a drift of h [s].
+  void begin(Real h);
+
+  /// Returns the largest change of a normal speed [m/s].
+  Real sweep();
+
+  /// Keeps what the sweeps came to. Depth that comes back faster than was asked, as sweeps have an end, is work from
+  /// outside, too.
+  void end();
+
+  /// Begins an attempt at the step.
+  void begin_attempt() { outside_work_ = 0; }
+
+  /// Of bodies that move and take no impulse, of driven particles, and of taking depth back, in this attempt [J].
+  Real outside_work() const { return outside_work_; }
+
+ private:
+  struct Row {
+    Contact* contact = nullptr;
+    SteppedBody *body = nullptr, *other = nullptr;  // of the point of a; of that of b, if it is one of particles
+    RigidBody* rigid = nullptr;
+    Vector3 arm, normal;       // from the centre of the rigid body; from b to a
+    Real point_mobility = 0;   // of the point of a [1/kg]
+    Real other_mobility = 0;   // of that of b, if it is one of particles
+    Real normal_mobility = 0;  // of both, along the normal
+    Real wanted = 0, recovery = 0;
+    bool is_driven = false;    // some particle of a is held
+    bool is_obstacle = false;  // b takes no impulse
+    Vector3 impulse = Vector3::Zero();
+
+    bool is_held() const { return point_mobility <= 0; }
+    Vector3 velocity_of_other() const;
+    Real mobility_of_other(const Vector3& direction) const;
+  };
+
+  Vector3 impulse_of(const Row& row, const Vector3& relative) const;
+  Real give(Row& row, const Vector3& impulse);
+  Real update(Row& row);
+  void share_among_held();
+  Real settle_held();
+
+  Island& island_;
+  std::vector<Row> rows_;
+  bool has_held_ = false;
+  Real outside_work_ = 0;
+};
+
+}  // namespace penalty
