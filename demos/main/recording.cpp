@@ -118,11 +118,11 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
   const Momenta start = scene.momenta();
   Real linear_drift = 0, angular_drift = 0, linear_scale = 0, angular_scale = 0;
   Real next_frame = 0;
-  const auto look = [&](long step, Real milliseconds) {
+  const auto look = [&](long step, const Energies& energies, Real milliseconds) {
     const Real time = static_cast<Real>(step) * dt;
     const StepReport report = scene.report();
     StepRecord record{.time = time,
-                      .energies = scene.energies(),
+                      .energies = energies,
                       .errors = bodies.errors(),
                       .penetration = scene.penetration(),
                       .contact_depth = report.contact_depth,
@@ -146,17 +146,18 @@ Recording record(Scene& scene, const RunOptions& options, long steps, const Fram
     }
   };
 
-  look(0, 0);
+  look(0, scene.energies(), 0);
   for (long step = 1; step <= steps; ++step) {
     const Real before = thread_milliseconds();
     scene.step(dt);
     const Real spent = thread_milliseconds() - before;
-    if (!scene.report().finite || !std::isfinite(scene.energies().total())) {
+    const Energies energies = scene.energies();
+    if (!scene.report().finite || !std::isfinite(energies.total())) {
       recording.finite = false;
       recording.failure = failure_message(scene, step, static_cast<Real>(step) * dt);
       break;
     }
-    look(step, spent);
+    look(step, energies, spent);
     progress(step);
   }
 

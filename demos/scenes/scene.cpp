@@ -259,13 +259,15 @@ std::vector<Pose> Scene::objects() const {
 Real Scene::penetration() const {
   const std::vector<Pose> poses = objects();
   Real deepest = 0;
-  for (std::size_t body = 0; body < impl_->bodies.size(); ++body)
+  for (std::size_t body = 0; body < impl_->bodies.size(); ++body) {
+    const PackedVectors& positions = particles(body).positions;
     for (const WeightedPoint& point : impl_->contact_points[body]) {
-      const Vector3 position = point.of(particles(body).positions);
+      const Vector3 position = point.of(positions);
       if (impl_->setup.ground) deepest = std::max(deepest, -position.y());
       for (std::size_t b = 0; b < poses.size(); ++b)
         deepest = std::max(deepest, depth(impl_->setup.objects[b], poses[b], position));
     }
+  }
   return deepest;
 }
 

@@ -1,5 +1,6 @@
 #include "held_bodies.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace penalty {
@@ -22,6 +23,16 @@ void HeldBody::read_nodes() {
     stepped.positions_changed();
   }
   stale = stale || changes.lighter;  // heavier particles only leave the estimate too high
+}
+
+void HeldBody::measure() {
+  const Particles& particles = stepped.particles;
+  box = {};
+  fastest2 = 0;
+  for (int i = 0; i < particles.size(); ++i) {
+    box.add(particles.positions.col(i).head<3>());
+    fastest2 = std::max(fastest2, particles.velocities.col(i).head<3>().squaredNorm());
+  }
 }
 
 void HeldBody::hold(const char* problem, bool stopped) noexcept {

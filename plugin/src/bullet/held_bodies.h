@@ -9,6 +9,7 @@
 #include "mesh_sides.h"
 #include "nodes.h"
 #include "penalty/bullet/attached_bodies.h"
+#include "penalty/contact/box.h"
 #include "penalty/contact/contact_surface.h"
 #include "penalty/stepping/island.h"
 
@@ -45,11 +46,16 @@ struct HeldBody {
   bool friction_is_finite = true;  // of what it touches
   int number = 0;                  // of the body in its island
   PackedVectors start;             // positions before the step, to go back to [m]
+  Box box;                         // of the particles before the step [m],
+  Real fastest2 = 0;               // and the square of their largest speed [m²/s²]: see `measure`
 
   Identity identity() const { return {body, serial}; }
 
   /// Adds what others changed to the state.
   void read_nodes();
+
+  /// Finds the box and the largest speed, once for all who ask where the body may come in the step.
+  void measure();
 
   /// The step failed: the body stays where it was at the start, and `problem` goes into the report. `stopped`: at rest;
   /// else it keeps its velocities. Never throws.

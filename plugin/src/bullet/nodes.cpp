@@ -60,6 +60,9 @@ NodeChanges Nodes::read(Particles& particles) {
   rejected_ = {};
   for (int i = 0; i < particles.size(); ++i) {
     btSoftBody::Node& node = body_->m_nodes[i];
+    // As most are, step after step.
+    if (node.m_x == written_positions_[i] && node.m_v == written_velocities_[i] && node.m_im == read_inverse_masses_[i])
+      continue;
     if (!is_inverse_mass(node.m_im)) {
       reject(i, "inverse mass is negative or not finite");
       node.m_im = read_inverse_masses_[i];
@@ -94,11 +97,13 @@ bool Nodes::read_forces(PackedVectors& forces) {
   bool any = false;
   for (int i = 0; i < size; ++i) {
     btVector3& force = body_->m_nodes[i].m_f;
-    if (!is_finite(force)) {
+    if (force.isZero()) continue;
+    if (is_finite(force)) {
+      any = true;
+    } else {
       reject(i, "force is not finite");
       force.setZero();
     }
-    any = any || !force.isZero();
   }
   if (!any && forces.size() == 0) return false;
   if (!any) {

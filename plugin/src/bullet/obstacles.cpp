@@ -89,13 +89,8 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
 
   const Real margin = body.getCollisionShape()->getMargin();
   const Real fall = stepped.gravity.norm() * duration * duration;
-  Box box;
-  Real fastest = 0;
-  for (int i = 0; i < particles.size(); ++i) {
-    box.add(particles.positions.col(i).head<3>());
-    fastest = std::max(fastest, particles.velocities.col(i).head<3>().squaredNorm());
-  }
-  fastest = std::sqrt(fastest);
+  const Box& box = held.box;
+  const Real fastest = std::sqrt(held.fastest2);
   const Real sweep = fastest * duration + fall + margin;
   if (!std::isfinite(sweep + box.low.sum() + box.high.sum())) return true;
 

@@ -35,20 +35,15 @@ struct Extent {
 // At the velocities that it has, those that its elastic energy may give it, and those of rigid bodies that hit it.
 Extent extent_of(const HeldBody& held, std::span<const TouchedRigidBody> touched, Real duration) {
   const SteppedBody& stepped = held.stepped;
-  Extent extent;
-  Real fastest2 = 0, pushed = 0;
-  for (int i = 0; i < stepped.particles.size(); ++i) {
-    extent.box.add(stepped.particles.positions.col(i).head<3>());
-    fastest2 = std::max(fastest2, stepped.particles.velocities.col(i).head<3>().squaredNorm());
-    if (stepped.external_forces.size() != 0)
-      pushed = std::max(pushed, stepped.particles.inverse_masses[i] * stepped.external_forces.col(i).norm());
-  }
-  if (stepped.mass > 0) fastest2 += 2 * std::max<Real>(held.stepped.elastic_energy, 0) / stepped.mass;
+  Real fastest2 = held.fastest2, pushed = 0;
+  for (int i = 0; i < stepped.external_forces.cols(); ++i)
+    pushed = std::max(pushed, stepped.particles.inverse_masses[i] * stepped.external_forces.col(i).norm());
+  if (stepped.mass > 0) fastest2 += 2 * std::max<Real>(stepped.elastic_energy, 0) / stepped.mass;
   Real fastest = std::sqrt(fastest2);
   for (const TouchedRigidBody& t : touched) fastest = std::max(fastest, t.start.velocity.norm());
-  extent.way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration +
-               Real(held.body->getCollisionShape()->getMargin());
-  return extent;
+  return {.box = held.box,
+          .way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration +
+                 Real(held.body->getCollisionShape()->getMargin())};
 }
 
 // As the nodes say, which the application may have changed.

@@ -153,6 +153,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
     held.stale = false;
     held.estimated_version = held.field.stiffness_version();
   }
+  held.measure();
   WorldIsland island;
   island.held.push_back(&held);
   held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);

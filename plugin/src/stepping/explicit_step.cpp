@@ -24,20 +24,19 @@ constexpr int fewest_on_held = 8;          // substeps where a rigid body may li
 constexpr Real substep_memory = 0.8;       // share of the last step's substeps that the next one starts from
 
 // v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
-// over the particles.
+// over the particles. Whole columns, whose last number stays zero: that takes fewer instructions than three numbers.
 template <bool drifts = false>
 void kick(SteppedBody& body, Real kick_time, [[maybe_unused]] Real drift_time = 0) {
+  using Column = Eigen::Matrix<Real, 4, 1>;
   const Real* f = body.forces.data();
   Real* v = body.particles.velocities.data();
   Real* x = body.particles.positions.data();
-  const Vector3 dv = kick_time * body.gravity;
+  Column dv;
+  dv << kick_time * body.gravity, 0;
   for (const Real inverse_mass : body.particles.inverse_masses) {
-    if (inverse_mass > 0) {
-      const Real scale = kick_time * inverse_mass;
-      for (int axis = 0; axis < 3; ++axis) v[axis] += scale * f[axis] + dv[axis];
-    }
-    if constexpr (drifts)
-      for (int axis = 0; axis < 3; ++axis) x[axis] += drift_time * v[axis];
+    Eigen::Map<Column, Eigen::Aligned16> velocity(v), position(x);
+    if (inverse_mass > 0) velocity += kick_time * inverse_mass * Eigen::Map<const Column, Eigen::Aligned16>(f) + dv;
+    if constexpr (drifts) position += drift_time * velocity;
     f += 4;
     v += 4;
     x += 4;
