@@ -55,11 +55,11 @@ void DrawnSurface::move_to(const PackedVectors& positions) {
 
 long DrawnSurface::crossings(const DrawnSurface& other) const {
   long count = 0;
-  for (const auto& [i, j] : edges_)
-    other.tree_.visit(box_of(Edge{i, j}), 0, [&](int t) {
+  for (const Edge& edge : edges_)
+    other.tree_.visit(box_of(edge), 0, [&](int t) {
       const Triangle& triangle = other.triangles_[t];
-      if (&other == this && (has(triangle, i) || has(triangle, j))) return;
-      count += pierces(at(i), at(j), other.at(triangle[0]), other.at(triangle[1]), other.at(triangle[2]));
+      if (&other == this && (has(triangle, edge[0]) || has(triangle, edge[1]))) return;
+      count += pierces(at(edge[0]), at(edge[1]), other.at(triangle[0]), other.at(triangle[1]), other.at(triangle[2]));
     });
   return count;
 }

@@ -113,29 +113,30 @@ TEST_P(MeshSides, NothingLeavesAClosedRoom) {
 }
 
 TEST_P(MeshSides, DepthIsTakenBackOnTheSideWhereMostOfTheBodyIs) {
-  for (const auto& [mesh_margin, margin] : all_margins)
+  for (const Margins& margins : all_margins)
     for (const bool turned : {false, true})
       for (const Real down : {-1.0, 1.0}) {
         const auto most_substeps = [&](Real height_of_lowest) {
           Simulation other(GetParam());
           other.set_gravity({0, 10 * down, 0});
-          add_mesh(other, turned ? sheet_mesh(2, 2, 7).turned() : sheet_mesh(2, 2, 7), mesh_margin);
+          add_mesh(other, turned ? sheet_mesh(2, 2, 7).turned() : sheet_mesh(2, 2, 7), margins.mesh);
           btSoftBody& body = other.add_jelly(
-              cube, jelly_with(margin, {-0.2, down < 0 ? height_of_lowest : -0.4 - height_of_lowest, -0.2}, 0.002));
+              cube,
+              jelly_with(margins.soft, {-0.2, down < 0 ? height_of_lowest : -0.4 - height_of_lowest, -0.2}, 0.002));
           int most = 0;
           for (int k = 0; k < 120; ++k) {
             other.step(frame);
             most = std::max(most, other.penalty().report(body).substeps);
           }
           const Real lowest = least(body, [&](const Vector3& x) { return -down * x.y(); });
-          EXPECT_NEAR(lowest, mesh_margin + margin, 1.5e-3) << "from " << height_of_lowest;
+          EXPECT_NEAR(lowest, margins.mesh + margins.soft, 1.5e-3) << "from " << height_of_lowest;
           return most;
         };
-        SCOPED_TRACE(::testing::Message() << "margins " << mesh_margin << ", " << margin << (turned ? ", turned" : "")
-                                          << ", gravity " << down);
-        const int at_rest = most_substeps(mesh_margin + margin + 1e-4);
+        SCOPED_TRACE(::testing::Message() << "margins " << margins.mesh << ", " << margins.soft
+                                          << (turned ? ", turned" : "") << ", gravity " << down);
+        const int at_rest = most_substeps(margins.mesh + margins.soft + 1e-4);
         for (const Real depth : {0.0005, 0.005, 0.02, 0.05})
-          EXPECT_LE(most_substeps(mesh_margin + margin - depth), 2 * at_rest) << depth << " m deep";
+          EXPECT_LE(most_substeps(margins.mesh + margins.soft - depth), 2 * at_rest) << depth << " m deep";
         for (const Real depth : {0.0, 0.0005, 0.01, 0.05, 0.12})
           EXPECT_LE(most_substeps(-depth), 2 * at_rest) << depth << " m behind the triangles";
       }

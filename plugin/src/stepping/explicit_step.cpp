@@ -251,22 +251,20 @@ Real constant_force_work(Island& island) {
   return work;
 }
 
-// Which of the bodies may touch something in the step.
-std::vector<char> touching(const Island& island, const SurfaceContacts& surfaces) {
-  std::vector<char> touch(island.bodies.size());
-  for (std::size_t k = 0; k < touch.size(); ++k) touch[k] = surfaces.may_touch(k);
+void find_touching(Island& island, const SurfaceContacts& surfaces) {
+  island.touching.resize(island.bodies.size());
+  for (std::size_t k = 0; k < island.bodies.size(); ++k) island.touching[k] = surfaces.may_touch(k);
   for (const Contact& contact : island.contacts)
     for (const Side* side : {&contact.a, &contact.b})
-      if (!side->is_rigid()) touch[side->body] = true;
-  return touch;
+      if (!side->is_rigid()) island.touching[side->body] = true;
 }
 
 // What holds a body up against a constant acceleration a takes a h from it after each kick of a substep h: energy is
 // then defined no better than the work over that speed, whatever the state. [J s], to be multiplied with h.
-Real contact_noise_rate(const Island& island, const std::vector<char>& touch, Real duration) {
+Real contact_noise_rate(const Island& island, Real duration) {
   Real rate = 0;
   for (std::size_t k = 0; k < island.bodies.size(); ++k)
-    if (touch[k]) rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
+    if (island.touching[k]) rate += island.bodies[k]->mass * island.bodies[k]->gravity.squaredNorm() * duration;
   for (const RigidBody& body : island.rigid_bodies)
     for (int axis = 0; axis < 3; ++axis)
       rate += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] * body.acceleration[axis] * duration;
@@ -297,8 +295,7 @@ void report_contacts(const Island& island) {
   }
 }
 
-int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, const std::vector<char>& touch,
-                    Real duration) {
+int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
   int substeps = surfaces.least_substeps();
   // It ends a step half a substep's fall too fast, whatever holds it.
   if (std::any_of(island.contacts.begin(), island.contacts.end(), [&](const Contact& contact) {
@@ -313,7 +310,7 @@ int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, const
     const SteppedBody& body = *island.bodies[k];
     int wanted = body.options.substeps;
     if (wanted == 0) {
-      const Real safety = touch[k] ? body.options.contact_safety : body.options.safety;
+      const Real safety = island.touching[k] ? body.options.contact_safety : body.options.safety;
       const Real limit = duration * std::sqrt(body.largest_eigenvalue + coupling_eigenvalue) / 2 / safety;
       wanted = limit < body.options.max_substeps ? static_cast<int>(std::ceil(limit)) : body.options.max_substeps;
     }
@@ -345,8 +342,8 @@ void advance_explicitly(Island& island, Real duration) {
   const Real start_energy = energy(island);
   SurfaceContacts surfaces(island);
   surfaces.begin_step(duration);
-  const std::vector<char> touch = touching(island, surfaces);
-  const Real contact_noise = contact_noise_rate(island, touch, duration) * duration;
+  find_touching(island, surfaces);
+  const Real contact_noise = contact_noise_rate(island, duration) * duration;
 
   SubCycle cycle(island, surfaces, duration);
   const auto attempt = [&](int substeps) {
@@ -359,7 +356,7 @@ void advance_explicitly(Island& island, Real duration) {
         .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / taken};
   };
   const GuardedStep step =
-      guard_energy(wanted_substeps(island, surfaces, touch, duration), start_energy,
+      guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
                    {.most_substeps = most_substeps, .factor = retry_growth, .increment = 1, .forgives_outside = true},
                    attempt, [&] { undo(island, surfaces); });
 

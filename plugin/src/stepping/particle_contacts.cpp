@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace penalty {
 namespace {
@@ -26,13 +27,18 @@ bool has_held_particle(const WeightedPoint& point, const Particles& particles) {
 
 }  // namespace
 
-Vector3 ParticleContacts::Row::velocity_of_other() const {
+Vector3 ParticleContactRow::velocity_of_other() const {
   return rigid ? rigid->velocity_at(arm) : contact->b.point.of(other->particles.velocities);
 }
 
-Real ParticleContacts::Row::mobility_of_other(const Vector3& direction) const {
+Real ParticleContactRow::mobility_of_other(const Vector3& direction) const {
   return rigid ? rigid->mobility_at(arm, direction) : other_mobility * direction.squaredNorm();
 }
+
+ParticleContacts::ParticleContacts(Island& island)
+    : island_(island),
+      rows_(island.particle_contact_rows ? *island.particle_contact_rows
+                                         : *(island.particle_contact_rows = std::make_shared<std::vector<Row>>())) {}
 
 bool ParticleContacts::are_coupled() const {
   return std::any_of(island_.contacts.begin(), island_.contacts.end(), [&](const Contact& contact) {
@@ -139,16 +145,14 @@ Real ParticleContacts::sweep() {
 // Nothing gives way at points that are held: pushed off one by one, what lies on many of them would spin and hop. They
 // begin with what each would give alone, divided by their number.
 void ParticleContacts::share_among_held() {
-  std::vector<Vector3> alone(rows_.size(), Vector3::Zero());
   Real number = 0;
-  for (std::size_t k = 0; k < rows_.size(); ++k) {
-    const Row& row = rows_[k];
+  for (Row& row : rows_) {
     if (!row.is_held()) continue;
-    alone[k] = impulse_of(row, row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other());
-    number += !alone[k].isZero(0);
+    row.impulse = impulse_of(row, row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other());
+    number += !row.impulse.isZero(0);
   }
-  for (std::size_t k = 0; k < rows_.size(); ++k)
-    if (!alone[k].isZero(0)) give(rows_[k], alone[k] / number);
+  for (Row& row : rows_)
+    if (row.is_held() && !row.impulse.isZero(0)) give(row, std::exchange(row.impulse, Vector3::Zero()) / number);
 }
 
 // Forth and back until nothing changes.

@@ -7,6 +7,25 @@ namespace penalty {
 inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
 inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
 
+/// A contact in one drift.
+struct ParticleContactRow {
+  Contact* contact = nullptr;
+  SteppedBody *body = nullptr, *other = nullptr;  // of the point of a; of that of b, if it is one of particles
+  RigidBody* rigid = nullptr;
+  Vector3 arm = Vector3::Zero(), normal = Vector3::Zero();  // from the centre of the rigid body; from b to a
+  Real point_mobility = 0;                                  // of the point of a [1/kg]
+  Real other_mobility = 0;                                  // of that of b, if it is one of particles
+  Real normal_mobility = 0;                                 // of both, along the normal
+  Real wanted = 0, recovery = 0;
+  bool is_driven = false;    // some particle of a is held
+  bool is_obstacle = false;  // b takes no impulse
+  Vector3 impulse = Vector3::Zero();
+
+  bool is_held() const { return point_mobility <= 0; }
+  Vector3 velocity_of_other() const;
+  Real mobility_of_other(const Vector3& direction) const;
+};
+
 /// One-sided constraints on velocities, met by sequential impulses that are summed and clipped contact by contact, as
 /// those of RigidContacts: a sweep may take back what an earlier one gave too much. Of the gap g and the relative normal
 /// speed u a contact asks u >= -g/h while the gap is open and u >= 0 when it is closed: it stops approach. Depth beyond
@@ -16,7 +35,7 @@ inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
 /// both momenta are kept to round-off. Friction is clipped to Coulomb's cone.
 class ParticleContacts {
  public:
-  explicit ParticleContacts(Island& island) : island_(island) {}
+  explicit ParticleContacts(Island& island);
 
   bool is_empty() const { return island_.contacts.empty(); }
 
@@ -40,23 +59,7 @@ class ParticleContacts {
   Real outside_work() const { return outside_work_; }
 
  private:
-  struct Row {
-    Contact* contact = nullptr;
-    SteppedBody *body = nullptr, *other = nullptr;  // of the point of a; of that of b, if it is one of particles
-    RigidBody* rigid = nullptr;
-    Vector3 arm, normal;       // from the centre of the rigid body; from b to a
-    Real point_mobility = 0;   // of the point of a [1/kg]
-    Real other_mobility = 0;   // of that of b, if it is one of particles
-    Real normal_mobility = 0;  // of both, along the normal
-    Real wanted = 0, recovery = 0;
-    bool is_driven = false;    // some particle of a is held
-    bool is_obstacle = false;  // b takes no impulse
-    Vector3 impulse = Vector3::Zero();
-
-    bool is_held() const { return point_mobility <= 0; }
-    Vector3 velocity_of_other() const;
-    Real mobility_of_other(const Vector3& direction) const;
-  };
+  using Row = ParticleContactRow;
 
   Vector3 impulse_of(const Row& row, const Vector3& relative) const;
   Real give(Row& row, const Vector3& impulse);
@@ -65,7 +68,7 @@ class ParticleContacts {
   Real settle_held();
 
   Island& island_;
-  std::vector<Row> rows_;
+  std::vector<Row>& rows_;  // of the island, which keeps their memory
   bool has_held_ = false;
   Real outside_work_ = 0;
 };

@@ -15,6 +15,7 @@
 namespace penalty {
 
 class SurfacePair;
+struct ParticleContactRow;
 struct SurfaceScratch;
 
 /// What implicit steps keep between steps.
@@ -94,6 +95,8 @@ struct Island {
 
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};
+  std::vector<char> touching = {};  // bodies that may touch something
+  std::shared_ptr<std::vector<ParticleContactRow>> particle_contact_rows = {};
   std::shared_ptr<SurfaceScratch> surface_scratch = {};
 };
 
