@@ -21,7 +21,6 @@ void keep_face_tree(btSoftBody& body) {
     box.Expand(btVector3(margin, margin, margin));
     face.m_leaf = tree.insert(box, &face);
   }
-  tree.optimizeTopDown();
 }
 
 }  // namespace penalty
