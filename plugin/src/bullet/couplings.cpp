@@ -1,6 +1,5 @@
 #include "couplings.h"
 
-#include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
@@ -11,35 +10,10 @@
 #include "held_bodies.h"
 #include "penalty/math/text.h"
 #include "world_island.h"
+#include "world_objects.h"
 
 namespace penalty {
 namespace {
-
-// All that is in a world: who is not among them may have been deleted.
-class WorldObjects final : public btBroadphaseAabbCallback {
- public:
-  WorldObjects(const HeldBodies& bodies, std::span<btSoftBody* const> listed) {
-    const auto held = std::find_if(listed.begin(), listed.end(), [&](btSoftBody* body) { return bodies.find(*body); });
-    if (held == listed.end()) return;
-    const btVector3 corner(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
-    (*held)->getWorldInfo()->m_broadphase->aabbTest(-corner, corner, *this);
-    std::sort(objects_.begin(), objects_.end());
-  }
-
-  bool process(const btBroadphaseProxy* proxy) override {
-    objects_.push_back(static_cast<btCollisionObject*>(proxy->m_clientObject));
-    return true;
-  }
-
-  /// Null if the object is not in the world, or another stands at its address.
-  btRigidBody* rigid_body(const Identity& name) const {
-    const auto found = std::lower_bound(objects_.begin(), objects_.end(), name.address);
-    return found != objects_.end() && name.is(**found) ? btRigidBody::upcast(*found) : nullptr;
-  }
-
- private:
-  std::vector<btCollisionObject*> objects_;
-};
 
 void check_points(const HeldBodies& bodies, const std::vector<CouplingPoint>& points) {
   bool any_soft = false;
@@ -133,7 +107,9 @@ void Couplings::wake(const HeldCoupling& coupling) {
 
 void Couplings::find_bodies(const HeldBodies& bodies, std::span<btSoftBody* const> listed) {
   if (couplings_.empty() && waking_.empty()) return;
-  const WorldObjects objects(bodies, listed);
+  const auto held = std::find_if(listed.begin(), listed.end(), [&](btSoftBody* body) { return bodies.find(*body); });
+  if (held == listed.end()) return;
+  const WorldObjects objects(*(*held)->getWorldInfo()->m_broadphase);
   const auto find = [&](HeldPoint& point) {
     HeldBody* const held = bodies.find(point.name);
     point.soft = held && bodies.is_listed(*held) ? held : nullptr;

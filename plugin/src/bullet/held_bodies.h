@@ -22,6 +22,14 @@ enum class StepOutcome {
   held,     // it stays where it is, and the report says why
 };
 
+/// One of Bullet's anchors, of this step.
+struct HeldAnchor {
+  int node;
+  btCollisionObject* object;
+  Vector3 local;  // where it is held, in the frame of the object [m]
+  Real influence;
+};
+
 struct HeldBody {
   HeldBody(btSoftBody& soft_body, PotentialField potential_field, const AttachOptions& attach_options);
 
@@ -44,10 +52,11 @@ struct HeldBody {
   int switched_off = 0;            // of the flags in m_cfg.collisions, within a world step
   int activation_state = 0;        // to be restored
   bool friction_is_finite = true;  // of what it touches
-  int number = 0;                  // of the body in its island
-  PackedVectors start;             // positions before the step, to go back to [m]
-  Box box;                         // of the particles before the step [m],
-  Real fastest2 = 0;               // and the square of their largest speed [m²/s²]: see `measure`
+  std::vector<HeldAnchor> anchors;
+  int number = 0;       // of the body in its island
+  PackedVectors start;  // positions before the step, to go back to [m]
+  Box box;              // of the particles before the step [m],
+  Real fastest2 = 0;    // and the square of their largest speed [m²/s²]: see `measure`
 
   Identity identity() const { return {body, serial}; }
 

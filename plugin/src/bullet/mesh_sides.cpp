@@ -8,6 +8,7 @@
 
 #include "convert.h"
 #include "cut_parts.h"
+#include "rigid_bodies.h"
 
 namespace penalty {
 namespace {
@@ -174,11 +175,9 @@ void MeshSides::begin_step() {
   for (const auto& mesh : meshes_) mesh->is_near = false;
 }
 
-void MeshSides::approach(const btCollisionObject& object, const MeshVisitor& body, Real reach) {
+void MeshSides::approach(const btCollisionObject& object, const Pose& pose, const MeshVisitor& body, Real reach) {
   near_.clear();
   const int id = object.getBroadphaseHandle()->m_uniqueId;
-  const Matrix3 to_world = to_matrix(object.getWorldTransform().getBasis());
-  const Vector3 world_origin = to_vector(object.getWorldTransform().getOrigin());
   int number = 0;
   visit_meshes(*object.getCollisionShape(), Matrix3::Identity(), Vector3::Zero(),
                [&](const btConcaveShape& shape, const Matrix3& rotation, const Vector3& origin) {
@@ -192,7 +191,7 @@ void MeshSides::approach(const btCollisionObject& object, const MeshVisitor& bod
                  Mesh& mesh = **known;
                  mesh.rotation = rotation;
                  mesh.origin = origin;
-                 mesh.follow(body, to_world * rotation, to_world * origin + world_origin, reach);
+                 mesh.follow(body, pose.rotation * rotation, pose.rotation * origin + pose.origin, reach);
                  if (mesh.is_near) near_.push_back(&mesh);
                });
 }

@@ -15,6 +15,7 @@ class btCollisionShape;
 namespace penalty {
 
 /// A soft body that comes near meshes, at the beginning of a step.
+struct Pose;
 struct MeshVisitor {
   const Particles& particles;
   const PotentialField& field;            // whose elements hold the particles together
@@ -40,8 +41,9 @@ class MeshSides {
   /// Forgets all: the points are others from now on.
   void forget();
 
-  /// Follows the body to where it is now relative to the meshes of the object, as far as they come within `reach` [m].
-  void approach(const btCollisionObject& object, const MeshVisitor& body, Real reach);
+  /// Follows the body to where it is now relative to the meshes of the object, which is at `pose`, as far as they come within
+  /// `reach` [m].
+  void approach(const btCollisionObject& object, const Pose& pose, const MeshVisitor& body, Real reach);
 
   /// Whether a point is to be asked for its planes wherever it is: it is on the wrong side of one of these meshes, or may
   /// have passed one.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body_anchors.h"
 #include "convert.h"
 #include "held_bodies.h"
 #include "rigid_surfaces.h"
@@ -105,8 +106,9 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     const Box object_box = bounds_of(*object);
     if (!object_box.overlaps(box, reach)) continue;
 
-    const Vector3 origin = to_vector(object->getWorldTransform().getOrigin());
-    const Matrix3 rotation = to_matrix(object->getWorldTransform().getBasis());
+    const Pose pose = pose_at_start(*object, duration);
+    const Vector3& origin = pose.origin;
+    const Matrix3& rotation = pose.rotation;
     Real friction = Real(body.m_cfg.kDF) * Real(object->getFriction());
     if (!std::isfinite(friction)) {
       friction = 0;
@@ -115,7 +117,9 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     Box reached = box;
     reached.low.array() -= reach;
     reached.high.array() += reach;
-    for (SurfacePair* pair : rigid_surfaces.near(held, *object, reached)) {
+    // Corners and edges would push the triangles at an anchor off what it holds them to.
+    const bool holds_some = is_anchored(held, *object);
+    for (SurfacePair* pair : holds_some ? std::vector<SurfacePair*>{} : rigid_surfaces.near(held, *object, reached)) {
       pair->b().friction = std::isfinite(pair->b().friction) ? pair->b().friction : 0;
       const bool approached = fastest > waking_speed && object_box.overlaps(box, 2 * margin);
       island.surfaces.push_back({pair, &held, nullptr, rigid_bodies.touch(*object, approached, island.touched)});
@@ -128,9 +132,10 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       return Vector3(duration * (v - of_object + duration * stepped.gravity));
     };
     const bool is_movable = rigid && !rigid->isStaticOrKinematicObject();
-    held.mesh_sides.approach(*object, {particles, held.field, held.options.contact_points}, margin + reach);
+    held.mesh_sides.approach(*object, pose, {particles, held.field, held.options.contact_points}, margin + reach);
     const auto add_point = [&](int number, const WeightedPoint& point) {
       if (!is_movable && point.mobility(particles.inverse_masses) <= 0) return;  // two that are held
+      if (holds_some && is_anchored(held, number, *object)) return;
       const Vector3 x = point.of(particles.positions);
       if (!object_box.contains(x, reach) && !held.mesh_sides.follows(number)) return;
       surface.clear();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "face_tree.h"
 #include "world_step.h"
@@ -79,6 +80,18 @@ void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
     held->nodes.remember_velocities();
   }
   attached_->freeze_held(bodies);
+}
+
+// Anchors of attached bodies are in the step: Bullet does not see them.
+void PenaltyDeformableBodySolver::setConstraints(const btContactSolverInfo& info) {
+  std::vector<std::pair<btSoftBody*, decltype(btSoftBody::m_deformableAnchors)>> hidden;
+  for (btSoftBody* body : listed(m_softBodies))
+    if (is_attached(*body) && body->m_deformableAnchors.size() > 0) {
+      hidden.emplace_back(body, body->m_deformableAnchors);
+      body->m_deformableAnchors.clear();
+    }
+  btDeformableBodySolver::setConstraints(info);
+  for (const auto& [body, anchors] : hidden) body->m_deformableAnchors.copyFromArray(anchors);
 }
 
 void PenaltyDeformableBodySolver::solveDeformableConstraints(btScalar time_step) {

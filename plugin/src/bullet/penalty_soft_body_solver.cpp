@@ -8,10 +8,10 @@
 namespace penalty {
 namespace {
 
-// What of Bullet's position constraints is left to an attached body: contacts with other soft bodies and anchors. Its
-// links are replaced by the field.
+// What of Bullet's position constraints is left to an attached body: contacts with soft bodies that are not. Its links are
+// replaced by the field, its anchors are in the step.
 bool has_position_constraints(const btSoftBody& body) {
-  return body.m_anchors.size() > 0 || body.m_scontacts.size() > 0 || body.m_clusters.size() > 0;
+  return body.m_scontacts.size() > 0 || body.m_clusters.size() > 0;
 }
 
 // Without the tree over the faces that Bullet makes if it is to: ours serves as well.
@@ -27,6 +27,7 @@ void solve_position_constraints(btSoftBody& body) {
   btSoftBody::tPSolverArray sequence;
   sequence.copyFromArray(body.m_cfg.m_psequence);
   body.m_cfg.m_psequence.remove(btSoftBody::ePSolver::Linear);
+  body.m_cfg.m_psequence.remove(btSoftBody::ePSolver::Anchors);
   body.solveConstraints();
   body.m_cfg.m_psequence.copyFromArray(sequence);
 }

@@ -53,6 +53,20 @@ void correct(const TouchedRigidBody& t, Real duration) {
 
 bool stands_still(const btRigidBody& body) { return body.isStaticObject() && !body.isKinematicObject(); }
 
+Pose pose_at_start(const btCollisionObject& object, Real duration) {
+  Pose pose{to_vector(object.getWorldTransform().getOrigin()), to_matrix(object.getWorldTransform().getBasis())};
+  const btRigidBody* body = btRigidBody::upcast(&object);
+  if (!body || !body->isKinematicObject()) return pose;
+  RigidBody back;
+  back.position = pose.origin;
+  back.rotation = pose.rotation;
+  back.velocity = -to_vector(body->getLinearVelocity());
+  back.angular_velocity = -to_vector(body->getAngularVelocity());
+  if (!back.velocity.allFinite() || !back.angular_velocity.allFinite()) return pose;
+  back.drift(duration);
+  return {back.position, back.rotation};
+}
+
 void RigidBodies::begin_step(Real duration, bool gravity_applied) {
   ++step_;
   duration_ = duration;
@@ -63,8 +77,9 @@ void RigidBodies::begin_step(Real duration, bool gravity_applied) {
 // The state of an object at the start of the step. Static, sleeping or not a rigid body at all: an obstacle at rest.
 RigidBody RigidBodies::start_of(const btCollisionObject& object) const {
   RigidBody start;
-  start.position = to_vector(object.getWorldTransform().getOrigin());
-  start.rotation = to_matrix(object.getWorldTransform().getBasis());
+  const Pose pose = pose_at_start(object, duration_);
+  start.position = pose.origin;
+  start.rotation = pose.rotation;
   const btRigidBody* body = btRigidBody::upcast(&object);
   if (!body || stands_still(*body)) return start;
   const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;

@@ -16,6 +16,15 @@ namespace penalty {
 /// Whether the body is static. Bullet's manual leaves that flag on bodies that it makes kinematic.
 bool stands_still(const btRigidBody& body);
 
+struct Pose {
+  Vector3 origin = Vector3::Zero();        // [m]
+  Matrix3 rotation = Matrix3::Identity();  // object to world
+};
+
+/// Where the object is at the start of a step of `duration` [s]. A kinematic body is where the application wants it at the
+/// end of the step, and comes there with its velocities.
+Pose pose_at_start(const btCollisionObject& object, Real duration);
+
 /// An object that takes part in a step.
 struct TouchedRigidBody {
   btRigidBody* body;  // null: an obstacle that is no rigid body

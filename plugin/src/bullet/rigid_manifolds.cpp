@@ -168,16 +168,14 @@ void add_ahead(const btCollisionObject& one, const btCollisionObject& two, Real 
   append_corners(two, one, reach, points);
 }
 
-RigidContact contact_of(const Point& point, int a, int b, const WorldIsland& island) {
-  const RigidBody &one = island.touched[a].start, &two = island.touched[b].start;
-  const auto local = [](const RigidBody& body, const btVector3& x) {
-    return Vector3(body.rotation.transpose() * (to_vector(x) - body.position));
-  };
+// In the frames of the bodies, from where the point was found: not where a kinematic one starts.
+RigidContact contact_of(const Point& point, int a, int b) {
+  const btTransform &of_a = point.a->getWorldTransform(), &of_b = point.b->getWorldTransform();
   return {.a = a,
           .b = b,
-          .anchor_a = local(one, point.on_a),
-          .anchor_b = local(two, point.on_b),
-          .normal = two.rotation.transpose() * to_vector(point.normal),
+          .anchor_a = to_vector(of_a.invXform(point.on_a)),
+          .anchor_b = to_vector(of_b.invXform(point.on_b)),
+          .normal = to_vector(of_b.getBasis().transpose() * point.normal),
           .friction = Real(point.friction),
           .restitution = Real(point.restitution)};
 }
@@ -232,7 +230,7 @@ void RigidManifolds::add(std::vector<WorldIsland>& islands, const btSoftBodyWorl
       std::vector<RigidContact> contacts;
       for (const Point& point : points) {
         const bool swapped = point.a != objects[0];
-        const RigidContact contact = contact_of(point, numbers[swapped], numbers[!swapped], *island);
+        const RigidContact contact = contact_of(point, numbers[swapped], numbers[!swapped]);
         if (is_finite(contact)) contacts.push_back(contact);
       }
       recall(island->touched, std::min(size_of(*objects[0]), size_of(*objects[1])), contacts);

@@ -24,6 +24,11 @@ void WorldIsland::absorb(WorldIsland& from) {
         side->body += first;
     contacts.push_back(contact);
   }
+  for (Anchor anchor : from.anchors) {
+    anchor.a.body += first;
+    anchor.b.rigid = renumbered[anchor.b.rigid];
+    anchors.push_back(anchor);
+  }
   held.insert(held.end(), from.held.begin(), from.held.end());
   couplings.insert(couplings.end(), from.couplings.begin(), from.couplings.end());
   for (HeldPair pair : from.surfaces) {
@@ -51,6 +56,7 @@ void WorldIsland::advance(Real duration, Island& island) {
   island.rigid_bodies.clear();
   for (const TouchedRigidBody& t : touched) island.rigid_bodies.push_back(t.start);
   island.contacts = contacts;
+  island.anchors = anchors;
   island.rigid_contacts = rigid_contacts;
   island.surfaces.clear();
   for (std::size_t k = 0; k < held.size(); ++k) held[k]->number = static_cast<int>(k);

@@ -17,6 +17,7 @@ struct WorldIsland {
   std::vector<TouchedRigidBody> touched;
   std::vector<HeldCoupling*> couplings;
   std::vector<Contact> contacts;
+  std::vector<Anchor> anchors;
   std::vector<HeldPair> surfaces;
   std::vector<RigidContact> rigid_contacts;
 

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <string>
 
+#include "body_anchors.h"
 #include "convert.h"
 #include "obstacles.h"
 #include "sleeping.h"
+#include "world_objects.h"
 
 namespace penalty {
 namespace {
@@ -154,9 +156,14 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
     held.estimated_version = held.field.stiffness_version();
   }
   held.measure();
+  held.anchors.clear();
+  if (has_anchors(body)) {
+    if (const char* problem = read_anchors(held, WorldObjects(*broadphase_))) return held.hold(problem, true);
+  }
   WorldIsland island;
   island.held.push_back(&held);
   held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);
+  add_anchors(held, rigid_bodies_, island);
   wait_for_carried(body, island);
   islands_.push_back(std::move(island));
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "anchors.h"
 #include "coupling.h"
 #include "energy_guard.h"
 #include "particle_contacts.h"
@@ -52,9 +53,15 @@ bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupl
 class SubCycle {
  public:
   SubCycle(Island& island, SurfaceContacts& surfaces, Real duration)
-      : island_(island), surfaces_(surfaces), rigid_contacts_(island), particle_contacts_(island), duration_(duration) {
-    has_contacts_ = !particle_contacts_.is_empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
-    are_coupled_ = !rigid_contacts_.is_empty() || particle_contacts_.are_coupled();
+      : island_(island),
+        surfaces_(surfaces),
+        rigid_contacts_(island),
+        particle_contacts_(island),
+        anchors_(island),
+        duration_(duration) {
+    has_contacts_ =
+        !particle_contacts_.is_empty() || !anchors_.is_empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
+    are_coupled_ = !rigid_contacts_.is_empty() || !anchors_.is_empty() || particle_contacts_.are_coupled();
     for (const SteppedBody* body : island_.bodies) {
       has_blocks_ = has_blocks_ || damps(*body) || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
@@ -73,6 +80,7 @@ class SubCycle {
     outside_work_ = since_contacts_ = 0;
     rigid_contacts_.begin_attempt();
     particle_contacts_.begin_attempt();
+    anchors_.begin_attempt();
     remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) body->step_flows = {};
     for (int block = 0; block < blocks; ++block) {
@@ -85,7 +93,7 @@ class SubCycle {
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
       if (!surfaces_.is_empty())
         solve_contacts(0, h, [&] { surfaces_.close(h, [this, h] { return sweep(h); }); });
-      else if (!rigid_contacts_.is_empty())
+      else if (!rigid_contacts_.is_empty() || !anchors_.is_empty())
         solve_contacts(0, h, [&] { converge(h); });
       if (has_blocks_) end_block(duration_ / blocks);
     }
@@ -93,7 +101,7 @@ class SubCycle {
   }
 
   Real outside_work() const {
-    return outside_work_ + rigid_contacts_.outside_work() + particle_contacts_.outside_work();
+    return outside_work_ + rigid_contacts_.outside_work() + particle_contacts_.outside_work() + anchors_.outside_work();
   }  // of obstacles, of driven particles, of taking depth back [J]
 
  private:
@@ -121,7 +129,8 @@ class SubCycle {
 
   // Once over the contacts with and between rigid bodies; returns whether that is to be done again.
   bool sweep(Real h) {
-    const Real of_rigid = rigid_contacts_.sweep(), of_particles = particle_contacts_.sweep();
+    const Real of_rigid = rigid_contacts_.sweep(),
+               of_particles = std::max(anchors_.sweep(), particle_contacts_.sweep());
     if (!are_coupled_) return false;
     const Real change = std::max(of_rigid, of_particles);
     if (sweeps_ == 0) first_change_ = change;
@@ -143,9 +152,11 @@ class SubCycle {
     sweeps_ = 0;
     rigid_contacts_.begin(h, since_contacts_);
     particle_contacts_.begin(h);
+    anchors_.begin(h, since_contacts_);
     solve();
     rigid_contacts_.end(since_contacts_);
     particle_contacts_.end();
+    anchors_.end(since_contacts_);
     since_contacts_ = 0;
     for (SteppedBody* body : island_.bodies) {
       const Particles& particles = body->particles;
@@ -218,6 +229,7 @@ class SubCycle {
   SurfaceContacts& surfaces_;
   RigidContacts rigid_contacts_;
   ParticleContacts particle_contacts_;
+  Anchors anchors_;
   Real duration_, remaining_ = 0;
   Real since_contacts_ = 0;  // time of the kicks since contacts were solved [s]
   Real first_change_ = 0;    // of a normal speed by the first sweep [m/s]
@@ -257,6 +269,7 @@ void find_touching(Island& island, const SurfaceContacts& surfaces) {
   for (const Contact& contact : island.contacts)
     for (const Side* side : {&contact.a, &contact.b})
       if (!side->is_rigid()) island.touching[side->body] = true;
+  for (const Anchor& anchor : island.anchors) island.touching[anchor.a.body] = true;
 }
 
 // What holds a body up against a constant acceleration a takes a h from it after each kick of a substep h: energy is

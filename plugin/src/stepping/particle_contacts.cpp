@@ -10,15 +10,6 @@ namespace {
 constexpr int most_held_passes = 30;   // in a sweep; they end when one changes no speed by more than
 constexpr Real held_tolerance = 1e-5;  // this share of what the first did
 
-// What an impulse on the point gives to whoever drives the particles of it that are held [J].
-Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles) {
-  Real work = 0;
-  for (int k = 0; k < point.size; ++k)
-    if (const int i = point.particles[k]; particles.inverse_masses[i] == 0)
-      work += point.weights[k] * impulse.dot(particles.velocities.col(i).head<3>());
-  return work;
-}
-
 bool has_held_particle(const WeightedPoint& point, const Particles& particles) {
   for (int k = 0; k < point.size; ++k)
     if (particles.inverse_masses[point.particles[k]] == 0) return true;
@@ -26,6 +17,14 @@ bool has_held_particle(const WeightedPoint& point, const Particles& particles) {
 }
 
 }  // namespace
+
+Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles) {
+  Real work = 0;
+  for (int k = 0; k < point.size; ++k)
+    if (const int i = point.particles[k]; particles.inverse_masses[i] == 0)
+      work += point.weights[k] * impulse.dot(particles.velocities.col(i).head<3>());
+  return work;
+}
 
 Vector3 ParticleContactRow::velocity_of_other() const {
   return rigid ? rigid->velocity_at(arm) : contact->b.point.of(other->particles.velocities);

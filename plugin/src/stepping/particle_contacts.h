@@ -7,6 +7,9 @@ namespace penalty {
 inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
 inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
 
+/// What an impulse on the point gives to whoever drives the particles of it that are held [J].
+Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles);
+
 /// A contact in one drift.
 struct ParticleContactRow {
   Contact* contact = nullptr;

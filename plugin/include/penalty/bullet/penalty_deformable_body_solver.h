@@ -25,6 +25,7 @@ class PenaltyDeformableBodySolver : public btDeformableBodySolver, public Attach
   ~PenaltyDeformableBodySolver() override;
 
   void predictMotion(btScalar time_step) override;
+  void setConstraints(const btContactSolverInfo& info) override;
   void solveDeformableConstraints(btScalar time_step) override;
   void applyTransforms(btScalar time_step) override;
   void processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) override;

@@ -29,6 +29,12 @@ struct Contact {
   Vector3 impulse = Vector3::Zero();  // on a, of the last sweep [N s], reported
 };
 
+/// The point of `a`, which belongs to particles, is held at that of `b`, which is fixed in a rigid body.
+struct Anchor {
+  Side a, b;
+  Real influence = 1;  // the share of what a substep would have to do, that it does: above zero, at most one
+};
+
 /// Where two rigid bodies touch, or may: the point of a may not go below the plane through the point of b.
 struct RigidContact {
   int a = -1, b = -1;                                              // indices into the rigid bodies of the island

@@ -90,6 +90,7 @@ struct Island {
   std::vector<RigidBody> rigid_bodies = {};
   std::vector<Coupling*> couplings = {};
   std::vector<Contact> contacts = {};  // of this step
+  std::vector<Anchor> anchors = {};
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
 

@@ -1,0 +1,28 @@
+// All that is in a world: who is not among them may have been deleted.
+#pragma once
+#include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
+
+#include <vector>
+
+#include "identity.h"
+
+class btRigidBody;
+
+namespace penalty {
+
+class WorldObjects final : public btBroadphaseAabbCallback {
+ public:
+  explicit WorldObjects(btBroadphaseInterface& world);
+
+  bool process(const btBroadphaseProxy* proxy) override;
+
+  bool contain(const btCollisionObject* object) const;
+
+  /// Null if the object is not in the world, or another stands at its address.
+  btRigidBody* rigid_body(const Identity& name) const;
+
+ private:
+  std::vector<btCollisionObject*> objects_;
+};
+
+}  // namespace penalty
