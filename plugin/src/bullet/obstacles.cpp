@@ -102,8 +102,12 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   std::vector<SurfacePoint> surface;
   for (btCollisionObject* object : obstacles_near(body, box, around)) {
     const btRigidBody* rigid = btRigidBody::upcast(object);
-    const Real reach = sweep + (rigid ? reach_of(*rigid, duration) : 0);
     const Box object_box = bounds_of(*object);
+    const auto [link_velocity, link_spin] = link_velocities(*object);
+    const Real reach =
+        sweep +
+        (rigid ? reach_of(*rigid, duration)
+               : duration * (link_velocity.norm() + link_spin.norm() * (object_box.high - object_box.low).norm()));
     if (!object_box.overlaps(box, reach)) continue;
 
     const Pose pose = pose_at_start(*object, duration);

@@ -2,6 +2,7 @@
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include <set>
 
@@ -51,6 +52,24 @@ void correct(const TouchedRigidBody& t, Real duration) {
 
 }  // namespace
 
+std::array<Vector3, 2> link_velocities(const btCollisionObject& object) {
+  std::array<Vector3, 2> velocities{Vector3::Zero(), Vector3::Zero()};
+  const btMultiBodyLinkCollider* collider = btMultiBodyLinkCollider::upcast(&object);
+  if (!collider || !collider->m_multiBody) return velocities;
+  const btMultiBody& body = *collider->m_multiBody;
+  if (collider->m_link < 0) {
+    velocities = {to_vector(body.getBaseVel()), to_vector(body.getBaseOmega())};
+  } else {
+    const std::size_t links = static_cast<std::size_t>(body.getNumLinks()) + 1, link = collider->m_link + 1U;
+    std::vector<btVector3> omega(links), velocity(links);  // in the frames of the links
+    body.compTreeLinkVelocities(omega.data(), velocity.data());
+    velocities = {to_vector(body.localDirToWorld(collider->m_link, velocity[link])),
+                  to_vector(body.localDirToWorld(collider->m_link, omega[link]))};
+  }
+  if (!velocities[0].allFinite() || !velocities[1].allFinite()) velocities.fill(Vector3::Zero());
+  return velocities;
+}
+
 bool stands_still(const btRigidBody& body) { return body.isStaticObject() && !body.isKinematicObject(); }
 
 Pose pose_at_start(const btCollisionObject& object, Real duration) {
@@ -81,7 +100,13 @@ RigidBody RigidBodies::start_of(const btCollisionObject& object) const {
   start.position = pose.origin;
   start.rotation = pose.rotation;
   const btRigidBody* body = btRigidBody::upcast(&object);
-  if (!body || stands_still(*body)) return start;
+  if (!body) {
+    const auto [velocity, angular_velocity] = link_velocities(object);
+    start.velocity = velocity;
+    start.angular_velocity = angular_velocity;
+    return start;
+  }
+  if (stands_still(*body)) return start;
   const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
   if (!is_dynamic && !body->isKinematicObject()) return start;
   start.velocity = to_vector(body->getLinearVelocity());

@@ -1,5 +1,6 @@
 // Rigid bodies, read before the step and corrected after it.
 #pragma once
+#include <array>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -24,6 +25,9 @@ struct Pose {
 /// Where the object is at the start of a step of `duration` [s]. A kinematic body is where the application wants it at the
 /// end of the step, and comes there with its velocities.
 Pose pose_at_start(const btCollisionObject& object, Real duration);
+
+/// Velocity [m/s] and angular velocity [rad/s] of a link of a multibody; zero of other objects.
+std::array<Vector3, 2> link_velocities(const btCollisionObject& object);
 
 /// An object that takes part in a step.
 struct TouchedRigidBody {
