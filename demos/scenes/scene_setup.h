@@ -45,7 +45,7 @@ struct SceneSetup {
   std::vector<RigidObject> objects = {};
   StepOptions step = {};  // of every body
   Look look = {};
-  bool sleeps = false;  // at rest the world may stop stepping the bodies; the deformable world then does
+  bool sleeps = false;  // at rest the world may stop stepping the bodies
   /// Called after each world step: what has to be seen as it happens. Empty: nothing has.
   std::function<void(const SceneState&)> watch = {};
   /// What the summary says of this scene alone, from its state at the end. Empty: nothing.
