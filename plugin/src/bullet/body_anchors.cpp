@@ -41,9 +41,11 @@ const char* read_anchors(HeldBody& held, const WorldObjects& objects) {
   return nullptr;
 }
 
-bool is_anchored(const HeldBody& held, int node, const btCollisionObject& object) {
-  return std::any_of(held.anchors.begin(), held.anchors.end(),
-                     [&](const HeldAnchor& anchor) { return anchor.node == node && anchor.object == &object; });
+bool is_anchored(const HeldBody& held, const WeightedPoint& point, const btCollisionObject& object) {
+  const auto end = point.particles.begin() + point.size;
+  return std::any_of(held.anchors.begin(), held.anchors.end(), [&](const HeldAnchor& anchor) {
+    return anchor.object == &object && std::find(point.particles.begin(), end, anchor.node) != end;
+  });
 }
 
 bool is_anchored(const HeldBody& held, const btCollisionObject& object) {

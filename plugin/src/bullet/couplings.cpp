@@ -108,8 +108,7 @@ void Couplings::wake(const HeldCoupling& coupling) {
 void Couplings::find_bodies(const HeldBodies& bodies, std::span<btSoftBody* const> listed) {
   if (couplings_.empty() && waking_.empty()) return;
   const auto held = std::find_if(listed.begin(), listed.end(), [&](btSoftBody* body) { return bodies.find(*body); });
-  if (held == listed.end()) return;
-  const WorldObjects objects(*(*held)->getWorldInfo()->m_broadphase);
+  const WorldObjects objects(held == listed.end() ? nullptr : (*held)->getWorldInfo()->m_broadphase);
   const auto find = [&](HeldPoint& point) {
     HeldBody* const held = bodies.find(point.name);
     point.soft = held && bodies.is_listed(*held) ? held : nullptr;

@@ -9,8 +9,8 @@ void keep_face_tree(btSoftBody& body) {
   const int size = body.m_faces.size();
   if (size == 0) return;
   // The leaves know their faces by address, and the faces move when one is added.
-  const bool is_whole = !tree.empty() && tree.m_leaves == size && body.m_faces[0].m_leaf->data == &body.m_faces[0];
-  if (is_whole) return;
+  const btSoftBody::Face& first = body.m_faces[0];
+  if (!tree.empty() && tree.m_leaves == size && first.m_leaf && first.m_leaf->data == &first) return;
   tree.clear();
   tree.m_leaves = 0;  // which that leaves as it was
   const btScalar margin = body.getCollisionShape()->getMargin();

@@ -14,8 +14,9 @@ class btCollisionShape;
 
 namespace penalty {
 
-/// A soft body that comes near meshes, at the beginning of a step.
 struct Pose;
+
+/// A soft body that comes near meshes, at the beginning of a step.
 struct MeshVisitor {
   const Particles& particles;
   const PotentialField& field;            // whose elements hold the particles together

@@ -139,7 +139,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     held.mesh_sides.approach(*object, pose, {particles, held.field, held.options.contact_points}, margin + reach);
     const auto add_point = [&](int number, const WeightedPoint& point) {
       if (!is_movable && point.mobility(particles.inverse_masses) <= 0) return;  // two that are held
-      if (holds_some && is_anchored(held, number, *object)) return;
+      if (holds_some && is_anchored(held, point, *object)) return;
       const Vector3 x = point.of(particles.positions);
       if (!object_box.contains(x, reach) && !held.mesh_sides.follows(number)) return;
       surface.clear();

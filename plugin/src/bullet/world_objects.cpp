@@ -6,9 +6,10 @@
 
 namespace penalty {
 
-WorldObjects::WorldObjects(btBroadphaseInterface& world) {
+WorldObjects::WorldObjects(btBroadphaseInterface* world) {
+  if (!world) return;
   const btVector3 corner(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
-  world.aabbTest(-corner, corner, *this);
+  world->aabbTest(-corner, corner, *this);
   std::sort(objects_.begin(), objects_.end());
 }
 

@@ -12,7 +12,8 @@ namespace penalty {
 
 class WorldObjects final : public btBroadphaseAabbCallback {
  public:
-  explicit WorldObjects(btBroadphaseInterface& world);
+  /// Of no world there is nothing.
+  explicit WorldObjects(btBroadphaseInterface* world);
 
   bool process(const btBroadphaseProxy* proxy) override;
 

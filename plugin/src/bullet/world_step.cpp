@@ -158,7 +158,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   held.measure();
   held.anchors.clear();
   if (has_anchors(body)) {
-    if (const char* problem = read_anchors(held, WorldObjects(*broadphase_))) return held.hold(problem, true);
+    if (const char* problem = read_anchors(held, WorldObjects(broadphase_))) return held.hold(problem, true);
   }
   WorldIsland island;
   island.held.push_back(&held);
