@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "body_anchors.h"
 #include "convert.h"
@@ -16,6 +17,10 @@
 
 namespace penalty {
 namespace {
+
+constexpr Real margins_taken_back = 2, share_taken_back = 0.05;  // of depth in bodies that can move: of their size
+
+Real size_of(const Box& box) { return (box.high - box.low).minCoeff(); }
 
 // The collision objects that a soft body may touch, of those in a box.
 class Candidates final : public btBroadphaseAabbCallback {
@@ -136,6 +141,9 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       return Vector3(duration * (v - of_object + duration * stepped.gravity));
     };
     const bool is_movable = rigid && !rigid->isStaticOrKinematicObject();
+    // What starts deep in a body that can move would be blown up around it, node by node.
+    const Real deepest = is_movable ? std::max(margins_taken_back * margin, share_taken_back * size_of(object_box))
+                                    : std::numeric_limits<Real>::infinity();
     held.mesh_sides.approach(*object, pose, {particles, held.field, held.options.contact_points}, margin + reach);
     const auto add_point = [&](int number, const WeightedPoint& point) {
       if (!is_movable && point.mobility(particles.inverse_masses) <= 0) return;  // two that are held
@@ -155,7 +163,8 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
                                    .b = Side::of_rigid(touched, anchor),
                                    .normal = nearest.normal,
                                    .radius = radius,
-                                   .friction = friction});
+                                   .friction = friction,
+                                   .deepest = deepest});
       }
     };
     if (held.options.contact_points.empty()) {

@@ -78,8 +78,9 @@ void ParticleContacts::begin(Real h) {
     if (contact.radius > 0 && !offset.isZero(0)) row.normal = offset.normalized();
     const Real gap = row.normal.dot(offset) - contact.radius;
     contact.depth = std::max(contact.depth, -gap);
-    row.recovery =
-        std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
+    if (-gap <= contact.deepest)
+      row.recovery =
+          std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
     row.normal_mobility = row.point_mobility + (row.is_obstacle ? 0 : row.mobility_of_other(row.normal));
     rows_.push_back(row);

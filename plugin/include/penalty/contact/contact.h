@@ -1,5 +1,7 @@
 // Where two bodies touch.
 #pragma once
+#include <limits>
+
 #include "penalty/contact/weighted_point.h"
 
 namespace penalty {
@@ -24,6 +26,8 @@ struct Contact {
   Vector3 normal = Vector3::UnitY();
   Real radius = 0;    // of a ball about the point of b; zero: a plane [m]
   Real friction = 0;  // Coulomb coefficient
+  Real deepest =
+      std::numeric_limits<Real>::infinity();  // depth that is taken back; what is deeper stays where it is [m]
 
   Real depth = 0;                     // largest depth during the step [m], reported
   Vector3 impulse = Vector3::Zero();  // on a, of the last sweep [N s], reported
