@@ -118,9 +118,11 @@ void AttachedBodies::World::hold_all(std::span<btSoftBody* const> listed, const 
 
 void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real duration) {
   stepped_.reserve(listed.size());
-  if (!listed.empty()) broadphase_ = listed.front()->getWorldInfo()->m_broadphase;
   for (btSoftBody* body : listed)
-    if (bodies->find(*body)) wake_if_hit(*body);
+    if (bodies->find(*body)) {
+      broadphase_ = body->getWorldInfo()->m_broadphase;  // which attach asked for
+      wake_if_hit(*body);
+    }
   Surfaces::wake_touched(*bodies, listed, duration);
   couplings.find_bodies(*bodies, listed);
   keep_awake_together(couplings, surfaces_, *bodies);
