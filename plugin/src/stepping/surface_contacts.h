@@ -38,6 +38,12 @@ struct TouchingParticle {
   Real weight, inverse_mass;
 };
 
+/// A share of a mobility that is left without turning, below which nothing is pushed.
+inline constexpr Real least_mobility = 1e-6;
+
+inline Eigen::Map<Vector3> vector(Real* p) { return Eigen::Map<Vector3>(p); }
+inline Eigen::Map<const Vector3> vector(const Real* p) { return Eigen::Map<const Vector3>(p); }
+
 /// What fails the guard: a pair of features, and where it comes from.
 struct FailingPair {
   const SurfaceContact* contact;
