@@ -41,7 +41,7 @@ TEST_P(Movers, ATurntableCarriesABody) {
     for (int k = 0; k < 120; ++k) step(platform, {0, -0.1, 0}, angle += std::min<Real>(1, k * frame) * frame);
     const Vector3 after = center_of_mass(sim.penalty().particles(body));
     const Vector3 carried = Eigen::AngleAxis<Real>(angle, Vector3::UnitY()) * before;
-    EXPECT_LT((after - carried).norm(), 0.03) << keeps_static_flag;
+    EXPECT_LT((after - carried).norm(), 0.01 * carried.norm()) << keeps_static_flag;
     sim.remove(body);
     sim.remove(platform);
   }
@@ -61,7 +61,7 @@ TEST_P(Movers, ALiftLiftsABodyAtItsUsualCost) {
       lowest_above = std::min(lowest_above, lowest(body) - 0.5 * k * frame);
     }
     EXPECT_LE(most, 2 * at_rest) << keeps_static_flag;
-    EXPECT_GT(lowest_above, 0.0185) << keeps_static_flag << ": margin 0.02";
+    EXPECT_GT(lowest_above, 0.0199) << keeps_static_flag << ": margin 0.02";
     EXPECT_LT(lowest(body), 0.75 + 0.06) << keeps_static_flag;
     sim.remove(body);
     sim.remove(platform);
