@@ -73,7 +73,7 @@ struct Drifting {
 };
 
 // Edges are given as the search found them: either first.
-std::set<Key> visited(const SurfacePair& pair) {
+std::set<Key> visited(SurfacePair& pair) {
   std::set<Key> found;
   pair.visit_near([&](const FeaturePair& q, Real) {
     Key key = key_of(q);

@@ -243,6 +243,9 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
     search(c, want, ahead);
     used = 0;
   }
+  pressed_.clear();
+  for (const FeaturePair& q : c.near)
+    if (!q.memory.is_empty()) pressed_.push_back(q);
   c.near.clear();
   for (FeaturePair& q : c.candidates) {
     if (q.at_search - used > want) break;
@@ -254,6 +257,9 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
     // What lies on each other at rest, as doubled vertices do, is no contact.
     if (q.at_refresh >= q.thickness + c.room || q.thickness < smallest_thickness * edge_) continue;
     c.near.push_back(q);
+    for (const FeaturePair& old : pressed_)
+      if (old.points == q.points && old.are_edges == q.are_edges && old.from_b == q.from_b)
+        c.near.back().memory = old.memory;
   }
   c.path = patch_a(c).path + patch_b(c).path;
   c.shift = patch_b(c).shift - patch_a(c).shift;

@@ -10,17 +10,6 @@ namespace {
 
 constexpr Real share = 0.2;  // of the way to the anchor, that a drift takes back
 
-// Change of the relative velocity by a unit impulse, by columns.
-Matrix3 mobility_of(const RigidBody& rigid, const Vector3& arm, Real point_mobility) {
-  Matrix3 mobility;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vector3 unit = Vector3::Unit(axis);
-    const Vector3 turn = rigid.inverse_inertia * arm.cross(unit);
-    mobility.col(axis) = point_mobility * unit + rigid.inverse_mass.cwiseProduct(unit) + turn.cross(arm);
-  }
-  return mobility;
-}
-
 }  // namespace
 
 void Anchors::Row::push(const Vector3& given) {
@@ -41,7 +30,7 @@ void Anchors::begin(Real h, Real since) {
     row.start = row.relative_velocity();
     const Real point_mobility = row.point->mobility(particles.inverse_masses);
     if (point_mobility <= 0 && !row.rigid->is_dynamic()) continue;  // two that are held
-    const Matrix3 mobility = mobility_of(*row.rigid, row.arm, point_mobility);
+    const Matrix3 mobility = point_mobility * Matrix3::Identity() + row.rigid->mobility_at(row.arm);
     row.inertia = point_mobility > 0 ? Matrix3(mobility.inverse())
                                      : Matrix3(mobility.completeOrthogonalDecomposition().pseudoInverse());
     Vector3 back = -share / h * (row.arm - row.rigid->rotation * anchor.b.anchor);

@@ -32,7 +32,10 @@ void SurfaceContacts::guard(Real h, Real remaining, const RigidSweep& rigid_swee
     find_failing(h);
     if (scratch_.failing.empty()) return;
     if (round < extra_sweeps) {
-      if (!collected) collect();
+      if (!collected) {
+        book_recovery();
+        collect(h);
+      }
       collected = true;
       rigid_sweep();
       bool hit = false;

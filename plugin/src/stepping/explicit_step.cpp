@@ -92,7 +92,7 @@ class SubCycle {
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
       if (!surfaces_.is_empty())
-        solve_contacts(0, h, [&] { surfaces_.close(h, [this, h] { return sweep(h); }); });
+        solve_contacts(0, h, [&] { surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); }); });
       else if (!rigid_contacts_.is_empty() || !anchors_.is_empty())
         solve_contacts(0, h, [&] { converge(h); });
       if (has_blocks_) end_block(duration_ / blocks);
@@ -113,7 +113,7 @@ class SubCycle {
       if (surfaces_.is_empty())
         solve_contacts(h, h, [&] { converge(h); });
       else
-        solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, [this, h] { return sweep(h); }); });
+        solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, since_contacts_, [this, h] { return sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
     } else {
       for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
@@ -151,11 +151,11 @@ class SubCycle {
     for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
     sweeps_ = 0;
     rigid_contacts_.begin(h, since_contacts_);
-    particle_contacts_.begin(h);
+    particle_contacts_.begin(h, since_contacts_);
     anchors_.begin(h, since_contacts_);
     solve();
     rigid_contacts_.end(since_contacts_);
-    particle_contacts_.end();
+    particle_contacts_.end(since_contacts_);
     anchors_.end(since_contacts_);
     since_contacts_ = 0;
     for (SteppedBody* body : island_.bodies) {

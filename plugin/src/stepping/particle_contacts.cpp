@@ -30,14 +30,11 @@ Vector3 ParticleContactRow::velocity_of_other() const {
   return rigid ? rigid->velocity_at(arm) : contact->b.point.of(other->particles.velocities);
 }
 
-Real ParticleContactRow::mobility_of_other(const Vector3& direction) const {
-  return rigid ? rigid->mobility_at(arm, direction) : other_mobility * direction.squaredNorm();
-}
-
 ParticleContacts::ParticleContacts(Island& island)
     : island_(island),
       rows_(island.particle_contact_rows ? *island.particle_contact_rows
-                                         : *(island.particle_contact_rows = std::make_shared<std::vector<Row>>())) {}
+                                         : *(island.particle_contact_rows = std::make_shared<std::vector<Row>>())),
+      starts_warm_(are_coupled() || !island.surfaces.empty()) {}
 
 bool ParticleContacts::are_coupled() const {
   return std::any_of(island_.contacts.begin(), island_.contacts.end(), [&](const Contact& contact) {
@@ -45,7 +42,7 @@ bool ParticleContacts::are_coupled() const {
   });
 }
 
-void ParticleContacts::begin(Real h) {
+void ParticleContacts::begin(Real h, Real since) {
   rows_.clear();
   rows_.reserve(island_.contacts.size());
   has_held_ = false;
@@ -62,15 +59,16 @@ void ParticleContacts::begin(Real h) {
       row.arm = x - row.rigid->position;
       row.normal = row.rigid->rotation * contact.normal;
       row.is_obstacle = !row.rigid->is_dynamic();
+      if (!row.is_obstacle) row.other_mobility = row.rigid->mobility_at(row.arm);
       offset = row.arm - row.rigid->rotation * contact.b.anchor;
     } else {
       row.other = island_.bodies[contact.b.body];
       row.normal = contact.normal;
-      row.other_mobility = contact.b.point.mobility(row.other->particles.inverse_masses);
-      row.is_obstacle = row.other_mobility <= 0;
+      const Real mobility = contact.b.point.mobility(row.other->particles.inverse_masses);
+      row.is_obstacle = mobility <= 0;
+      row.other_mobility.diagonal().setConstant(mobility);
       offset = x - contact.b.point.of(row.other->particles.positions);
     }
-    contact.impulse.setZero();
     row.point_mobility = point.mobility(particles.inverse_masses);
     if (row.is_held() && row.is_obstacle) continue;
     has_held_ = has_held_ || row.is_held();
@@ -82,26 +80,57 @@ void ParticleContacts::begin(Real h) {
       row.recovery =
           std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
-    row.normal_mobility = row.point_mobility + (row.is_obstacle ? 0 : row.mobility_of_other(row.normal));
+    row.normal_mobility = row.mobility(row.normal);
     rows_.push_back(row);
   }
+  if (starts_warm_) start(since);
   if (has_held_) share_among_held();
+}
+
+// With what they gave before: the share of it that is best for all.
+void ParticleContacts::start(Real since) {
+  Real before = 0, after = 0;
+  for (Row& row : rows_) {
+    row.start.setZero();
+    if (row.is_held() || row.contact->memory.is_empty()) continue;
+    row.start = into_cone(row, row.contact->memory.start(since));
+    before += row.start.dot(relative_velocity(row) - row.wanted * row.normal);
+  }
+  if (!(before < 0)) return;
+  for (Row& row : rows_)
+    if (!row.start.isZero(0)) give(row, row.start);
+  for (const Row& row : rows_) after += row.start.dot(relative_velocity(row) - row.wanted * row.normal);
+  const Real share = best_share(before, after);
+  if (share == 1) return;
+  for (Row& row : rows_)
+    if (!row.start.isZero(0)) give(row, share * row.start);
+}
+
+void ParticleContacts::begin_attempt() {
+  outside_work_ = 0;
+  for (Contact& contact : island_.contacts) contact.memory = {};
+}
+
+// The nearest that presses, and rubs no more than it may.
+Vector3 ParticleContacts::into_cone(const Row& row, const Vector3& impulse) {
+  const Real pressed = row.normal.dot(impulse);
+  if (!(pressed > 0)) return Vector3::Zero();
+  Vector3 rubbed = impulse - pressed * row.normal;
+  const Real size = rubbed.norm(), most = row.contact->friction * pressed;
+  if (size > most) rubbed *= most / size;
+  return pressed * row.normal + rubbed;
 }
 
 // What it should have been given.
 Vector3 ParticleContacts::impulse_of(const Row& row, const Vector3& relative) const {
   const Real speed = row.normal.dot(relative), given = row.normal.dot(row.impulse);
-  const Real pressed = std::max<Real>(given + (row.wanted - speed) / row.normal_mobility, 0);
-  if (pressed == 0) return Vector3::Zero();
+  const Real pressed = given + (row.wanted - speed) / row.normal_mobility;
+  if (!(pressed > 0)) return Vector3::Zero();
   Vector3 rubbed = row.impulse - given * row.normal;
   const Vector3 slip = relative - speed * row.normal;
-  if (const Real slip_speed = slip.norm(); row.contact->friction > 0 && slip_speed > 1e-12) {
-    const Real mobility = row.is_obstacle ? 0 : row.mobility_of_other(slip / slip_speed);
-    rubbed -= slip / (row.point_mobility + mobility);
-  }
-  const Real size = rubbed.norm(), most = row.contact->friction * pressed;
-  if (size > most) rubbed *= most / size;
-  return pressed * row.normal + rubbed;
+  if (const Real slip_speed = slip.norm(); row.contact->friction > 0 && slip_speed > 1e-12)
+    rubbed -= slip / row.mobility(slip / slip_speed);
+  return into_cone(row, pressed * row.normal + rubbed);
 }
 
 // Returns the change of its normal speed [m/s].
@@ -113,9 +142,7 @@ Real ParticleContacts::give(Row& row, const Vector3& impulse) {
   const Vector3 relative = point.of(particles.velocities) - of_other;
   const Real along = row.normal.dot(change);
   const Real recovery = along * row.recovery;  // as of an obstacle that moves so fast
-  const Real mobility =
-      row.point_mobility * change.squaredNorm() + (row.is_obstacle ? 0 : row.mobility_of_other(change));
-  row.body->step_flows.contact_loss += recovery - change.dot(relative) - mobility / 2;
+  row.body->step_flows.contact_loss += recovery - change.dot(relative) - row.mobility(change) / 2;
   outside_work_ += recovery;
   if (row.is_driven) outside_work_ -= driving_work(point, change, particles);
   if (!row.is_held()) point.add_push(change, particles.inverse_masses, particles.velocities);
@@ -130,8 +157,7 @@ Real ParticleContacts::give(Row& row, const Vector3& impulse) {
 }
 
 Real ParticleContacts::update(Row& row) {
-  const Vector3 relative = row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other();
-  const Vector3 impulse = impulse_of(row, relative);
+  const Vector3 impulse = impulse_of(row, relative_velocity(row));
   return impulse == row.impulse ? 0 : give(row, impulse);
 }
 
@@ -148,7 +174,7 @@ void ParticleContacts::share_among_held() {
   Real number = 0;
   for (Row& row : rows_) {
     if (!row.is_held()) continue;
-    row.impulse = impulse_of(row, row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other());
+    row.impulse = impulse_of(row, relative_velocity(row));
     number += !row.impulse.isZero(0);
   }
   for (Row& row : rows_)
@@ -169,12 +195,11 @@ Real ParticleContacts::settle_held() {
   return first;
 }
 
-void ParticleContacts::end() {
+void ParticleContacts::end(Real since) {
   for (const Row& row : rows_) {
-    row.contact->impulse = row.impulse;
+    if (starts_warm_) row.contact->memory.keep(row.impulse, row.normal, since);
     if (row.wanted < 0 || row.impulse.isZero(0)) continue;  // what was open, or pushed nothing
-    const Vector3 relative = row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other();
-    const Real excess = row.normal.dot(relative) - row.wanted;
+    const Real excess = row.normal.dot(relative_velocity(row)) - row.wanted;
     if (excess > 0) outside_work_ += excess * row.normal.dot(row.impulse);
   }
 }

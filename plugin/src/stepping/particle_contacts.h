@@ -16,17 +16,21 @@ struct ParticleContactRow {
   SteppedBody *body = nullptr, *other = nullptr;  // of the point of a; of that of b, if it is one of particles
   RigidBody* rigid = nullptr;
   Vector3 arm = Vector3::Zero(), normal = Vector3::Zero();  // from the centre of the rigid body; from b to a
-  Real point_mobility = 0;                                  // of the point of a [1/kg]
-  Real other_mobility = 0;                                  // of that of b, if it is one of particles
-  Real normal_mobility = 0;                                 // of both, along the normal
+  Real point_mobility = 0;                                  // of the point of a [1/kg],
+  Matrix3 other_mobility = Matrix3::Zero();                 // of the other one,
+  Real normal_mobility = 0;                                 // and of both, along the normal
   Real wanted = 0, recovery = 0;
   bool is_driven = false;    // some particle of a is held
   bool is_obstacle = false;  // b takes no impulse
-  Vector3 impulse = Vector3::Zero();
+  Vector3 impulse = Vector3::Zero(), start = Vector3::Zero();
 
   bool is_held() const { return point_mobility <= 0; }
   Vector3 velocity_of_other() const;
-  Real mobility_of_other(const Vector3& direction) const;
+
+  /// Of both, along the impulse; times its square.
+  Real mobility(const Vector3& impulse) const {
+    return point_mobility * impulse.squaredNorm() + (is_obstacle ? 0 : impulse.dot(other_mobility * impulse));
+  }
 };
 
 /// One-sided constraints on velocities, met by sequential impulses that are summed and clipped contact by contact, as
@@ -45,18 +49,19 @@ class ParticleContacts {
   /// What one of them gives may change what another one needs: one sweep is not enough.
   bool are_coupled() const;
 
-  /// Before the sweeps of a drift of h [s].
-  void begin(Real h);
+  /// Before the sweeps of a drift of h [s]; `since` [s] is how long forces acted since the last: as in the last one, they
+  /// are met by its impulses, unless one sweep is enough.
+  void begin(Real h, Real since);
 
   /// Returns the largest change of a normal speed [m/s].
   Real sweep();
 
   /// Keeps what the sweeps came to. Depth that comes back faster than was asked, as sweeps have an end, is work from
   /// outside, too.
-  void end();
+  void end(Real since);
 
   /// Begins an attempt at the step.
-  void begin_attempt() { outside_work_ = 0; }
+  void begin_attempt();
 
   /// Of bodies that move and take no impulse, of driven particles, and of taking depth back, in this attempt [J].
   Real outside_work() const { return outside_work_; }
@@ -64,6 +69,11 @@ class ParticleContacts {
  private:
   using Row = ParticleContactRow;
 
+  static Vector3 relative_velocity(const Row& row) {
+    return row.contact->a.point.of(row.body->particles.velocities) - row.velocity_of_other();
+  }
+  void start(Real since);
+  static Vector3 into_cone(const Row& row, const Vector3& impulse);
   Vector3 impulse_of(const Row& row, const Vector3& relative) const;
   Real give(Row& row, const Vector3& impulse);
   Real update(Row& row);
@@ -72,7 +82,7 @@ class ParticleContacts {
 
   Island& island_;
   std::vector<Row>& rows_;  // of the island, which keeps their memory
-  bool has_held_ = false;
+  bool has_held_ = false, starts_warm_ = false;
   Real outside_work_ = 0;
 };
 

@@ -32,7 +32,8 @@ void RigidContacts::begin(Real h, Real since) {
             .arm_a = at - a.position,
             .arm_b = at - b.position,
             .normal = b.rotation * contact.normal};
-    row.mobility = a.mobility_at(row.arm_a, row.normal) + b.mobility_at(row.arm_b, row.normal);
+    row.mobility = a.mobility_at(row.arm_a) + b.mobility_at(row.arm_b);
+    row.normal_mobility = row.normal.dot(row.mobility * row.normal);
     const Real gap = row.normal.dot(at_a - at_b), speed = row.normal.dot(relative_velocity(row));
     row.recovery = std::clamp<Real>((-gap - slop) / std::max(recovery_time, h), 0, recovery_speed);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
@@ -43,7 +44,7 @@ void RigidContacts::begin(Real h, Real since) {
   }
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     Row& row = rows_[k];
-    if (!(row.mobility > 0)) continue;
+    if (!(row.normal_mobility > 0)) continue;
     const Vector3 expected = since * island_.rigid_contacts[k].force;
     row.impulse = std::max<Real>(row.normal.dot(expected), 0);
     row.friction_impulse = expected - row.normal.dot(expected) * row.normal;
@@ -67,13 +68,14 @@ Real RigidContacts::sweep() {
   Real largest = 0;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     Row& row = rows_[k];
-    if (!(row.mobility > 0)) continue;
+    if (!(row.normal_mobility > 0)) continue;
     const Vector3 relative = relative_velocity(row);
     const Real before = row.impulse;
-    row.impulse = std::max<Real>(before + (row.wanted - row.normal.dot(relative)) / row.mobility, 0);
+    row.impulse = std::max<Real>(before + (row.wanted - row.normal.dot(relative)) / row.normal_mobility, 0);
+    if (row.impulse == 0 && before == 0) continue;
     const Real change = row.impulse - before;
     if (change != 0) {
-      largest = std::max(largest, std::abs(change) * row.mobility);
+      largest = std::max(largest, std::abs(change) * row.normal_mobility);
       push(row, change * row.normal);
       outside_work_ += change * row.recovery;
     }
@@ -83,7 +85,7 @@ Real RigidContacts::sweep() {
     const Real speed = slip.norm();
     if (!(speed > 0) && row.friction_impulse.isZero(0)) continue;
     const Vector3 direction = speed > 0 ? Vector3(slip / speed) : Vector3(row.friction_impulse.normalized());
-    const Real mobility = row.a->mobility_at(row.arm_a, direction) + row.b->mobility_at(row.arm_b, direction);
+    const Real mobility = direction.dot(row.mobility * direction);
     Vector3 friction = row.friction_impulse - speed / mobility * direction;
     if (const Real size = friction.norm(); size > most) friction *= most / size;
     largest = std::max(largest, (friction - row.friction_impulse).norm() * mobility);

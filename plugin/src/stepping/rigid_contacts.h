@@ -36,7 +36,8 @@ class RigidContacts {
     RigidBody *a = nullptr, *b = nullptr;
     bool a_moves = false, b_moves = false;
     Vector3 arm_a, arm_b, normal;
-    Real mobility = 0, wanted = 0, recovery = 0;
+    Matrix3 mobility = Matrix3::Zero();  // of both
+    Real normal_mobility = 0, wanted = 0, recovery = 0;
     bool is_impact = false;
     Real impulse = 0;
     Vector3 friction_impulse = Vector3::Zero();

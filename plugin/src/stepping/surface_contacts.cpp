@@ -86,19 +86,21 @@ bool SurfaceContacts::refresh(Real h, Real remaining) {
   return changed;
 }
 
-void SurfaceContacts::sweep(Real h, Real remaining, const RigidSweep& rigid_sweep) {
+void SurfaceContacts::sweep(Real h, Real remaining, Real since, const RigidSweep& rigid_sweep) {
   take_velocities();
   refresh(h, remaining);
-  collect();
-  if (converge(h, rigid_sweep)) take_velocities();
+  collect(h);
+  if (converge(h, since, rigid_sweep)) take_velocities();
   guard(h, remaining, rigid_sweep);
+  book_recovery();
 }
 
-void SurfaceContacts::close(Real h, const RigidSweep& rigid_sweep) {
+void SurfaceContacts::close(Real h, Real since, const RigidSweep& rigid_sweep) {
   take_velocities();
   refresh(h, h);
-  collect();
-  converge(h, rigid_sweep);
+  collect(h);
+  converge(h, since, rigid_sweep);
+  book_recovery();
 }
 
 void SurfaceContacts::drifted(Real h) {
@@ -118,42 +120,47 @@ void SurfaceContacts::undo() {
   for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
 }
 
-void SurfaceContacts::collect() {
+void SurfaceContacts::collect(Real h) {
   scratch_.pairs.clear();
   scratch_.particles.clear();
   for (const SurfaceContact& contact : island_.surfaces) {
-    contact.pair->visit_near([&](const FeaturePair& q, Real reach) {
+    contact.pair->visit_near([&](FeaturePair& q, Real reach) {
       const ClosestPoints closest = contact.pair->closest(q);
       if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
       const Real limit = q.thickness + reach;
-      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr);
+      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory);
     });
     if (!contact.pair->enclosed().empty()) lead_out(contact);
   }
+  for (TouchingPair& pair : scratch_.pairs)
+    pair.wanted = pair.gap >= 0 ? -pair.gap / h
+                                : std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
+                                                   pair.leads_out ? exit_speed : recovery_speed);
 }
 
 void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest,
-                          const Vector3* leads_out) {
+                          const Vector3* leads_out, ContactMemory* memory) {
   const SurfacePair& surfaces = *contact.pair;
   const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
   TouchingPair pair{.begin = scratch_.particles.size(),
                     .difference = closest.difference,
                     .thickness = q.thickness - surfaces.b().radius(),
                     .friction = surfaces.friction(),
+                    .memory = memory,
                     .leads_out = leads_out != nullptr,
                     .body_a = contact.body_a,
                     .body_b = contact.rigid < 0 ? contact.body_b : contact.body_a};
   const Real distance = closest.difference.norm();
   pair.gap = (leads_out ? -distance : distance) - q.thickness;
   if (leads_out) {
-    pair.normal = *leads_out;
+    pair.axes.col(0) = *leads_out;
   } else if (!surfaces.has_no_direction(q, distance)) {
-    pair.normal = closest.difference / distance;
+    pair.axes.col(0) = closest.difference / distance;
   } else {  // a closed surface knows its outside
     if (q.are_edges || !two.is_closed()) return;
     const Vector3 a = two.position(q.points[1]);
-    pair.normal = (two.position(q.points[2]) - a).cross(two.position(q.points[3]) - a).normalized();
-    if (pair.normal.isZero(0)) return;
+    pair.axes.col(0) = (two.position(q.points[2]) - a).cross(two.position(q.points[3]) - a).normalized();
+    if (pair.axes.col(0).isZero(0)) return;
   }
   const int of_first = q.from_b ? contact.body_b : contact.body_a,
             of_second = q.from_b ? contact.body_a : contact.body_b;
@@ -167,17 +174,12 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
     at += std::abs(closest.weights[k]) * surface.position(q.points[k]);
   }
   pair.end = scratch_.particles.size();
-  for (std::size_t k = pair.begin; k < pair.end; ++k) {
-    const TouchingParticle& p = scratch_.particles[k];
-    pair.soft_mobility += p.weight * p.weight * p.inverse_mass;
-  }
-  pair.mobility = pair.soft_mobility;
   if (contact.rigid >= 0) {
     pair.rigid = &island_.rigid_bodies[contact.rigid];
     pair.rigid_weight = one.is_rigid() ? 1 : -1;
     pair.arm = at - pair.rigid->position;
-    pair.mobility += pair.rigid->mobility_at(pair.arm, pair.normal);
   }
+  make_normal_row(pair);
   if (!(pair.mobility > 0)) {
     scratch_.particles.resize(pair.begin);
     return;
@@ -252,23 +254,16 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
   for (const Way& way : ways)
     if (way.is_inside) {
       const Vector3 out = way.features.from_b ? Vector3(-direction) : direction;
-      add(contact, way.features, way.closest, &out);
+      add(contact, way.features, way.closest, &out, nullptr);
     } else {
-      add(contact, way.features, way.closest, nullptr);
+      add(contact, way.features, way.closest, nullptr, nullptr);
     }
 }
 
-Vector3 SurfaceContacts::relative_velocity(const TouchingPair& pair) const {
-  Vector3 sum = Vector3::Zero();
-  for (std::size_t k = pair.begin; k < pair.end; ++k)
-    sum += scratch_.particles[k].weight * vector(scratch_.particles[k].velocity);
-  if (pair.rigid) sum += pair.rigid_weight * pair.rigid->velocity_at(pair.arm);
-  return sum;
-}
-
-bool SurfaceContacts::converge(Real h, const RigidSweep& rigid_sweep) {
+bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep) {
   bool changed = false;
   Real first = 0;
+  start(since);
   for (int sweep = 0; sweep < most_sweeps && !scratch_.pairs.empty(); ++sweep) {
     const bool again = rigid_sweep();
     bool hit = false;
@@ -282,64 +277,27 @@ bool SurfaceContacts::converge(Real h, const RigidSweep& rigid_sweep) {
   for (int sweep = 0; rigid_sweep() && sweep < most_sweeps; ++sweep) {
   }
   for (const TouchingPair& pair : scratch_.pairs) {
-    if (pair.gap > 0 || pair.given == 0) continue;
-    const Real excess = pair.normal.dot(relative_velocity(pair)) - wanted_speed(pair, h);
-    if (excess > 0) outside_work_ += excess * pair.given;  // lost thickness that comes back faster than was asked
+    if (pair.memory)
+      pair.memory->keep(pair.given * pair.axes.col(0) + pair.axes.rightCols<2>() * pair.rubbed, pair.axes.col(0),
+                        since);
+    changed = changed || pair.given > 0;
   }
   return changed || !island_.contacts.empty() || !island_.rigid_contacts.empty();
-}
-
-// Without the rotation `turn` that a unit impulse would give. Whoever drives what is held does the work of what it
-// gives.
-void SurfaceContacts::push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn) {
-  for (std::size_t k = pair.begin; k < pair.end; ++k) {
-    const TouchingParticle& p = scratch_.particles[k];
-    if (p.inverse_mass > 0)
-      vector(p.velocity) +=
-          impulse * (p.weight * p.inverse_mass * direction - turn.cross(Vector3(vector(p.position)) - pair.center));
-    else
-      outside_work_ -= p.weight * impulse * direction.dot(vector(p.velocity));
-  }
-  if (!pair.rigid) return;
-  const Vector3 given = pair.rigid_weight * impulse * direction;
-  if (pair.rigid->is_dynamic())
-    pair.rigid->push(given, pair.arm);
-  else
-    outside_work_ -= given.dot(pair.rigid->velocity_at(pair.arm));
-}
-
-Real SurfaceContacts::wanted_speed(const TouchingPair& pair, Real h) {
-  if (pair.gap >= 0) return -pair.gap / h;
-  return std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
-                          pair.leads_out ? exit_speed : recovery_speed);
 }
 
 // Returns the largest change of a distance in the drift, relative to its thickness.
 Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
   Real worst = 0;
   for (TouchingPair& pair : scratch_.pairs) {
-    const Vector3 velocity = relative_velocity(pair);
-    const Vector3 turn = pair.leads_out && !pair.rigid ? turn_of(pair, pair.normal) : Vector3(Vector3::Zero());
-    const Real speed = pair.normal.dot(velocity) - turn.dot(spin_of(pair, turn));
-    const Real wanted = wanted_speed(pair, h);
-    if (speed >= wanted && pair.given == 0) continue;
-    const Real mobility = pair.mobility - pair.difference.cross(pair.normal).dot(turn);
-    if (!(mobility > least_mobility * pair.mobility)) continue;
-    Real given = std::max<Real>(pair.given + (wanted - speed) / mobility, 0);
-    if (pair.leads_out) given = std::min(given, exit_acceleration * h / mobility);
-    const Real impulse = given - pair.given;
-    if (impulse == 0) continue;
-    pair.given = given;
-    const Real reached = speed + impulse * mobility;
+    const Real speed = speed_of(pair, 0);
+    if (speed >= pair.wanted && pair.given == 0) continue;
+    Real given = std::max<Real>(pair.given + (pair.wanted - speed) / pair.mobility, 0);
+    if (pair.leads_out) given = std::min(given, exit_acceleration * h / pair.mobility);
+    if (given == pair.given) continue;
     hit = true;
-    worst = std::max(worst, std::abs(reached - speed) * h / pair.thickness);
-    push(pair, impulse, pair.normal, turn);
-    const Real recovery = impulse * std::clamp<Real>(reached, 0, std::max<Real>(wanted, 0));  // as of a surface so fast
-    outside_work_ += recovery;
-    const Real loss = recovery - impulse * (speed + reached) / 2;
-    island_.bodies[pair.body_a]->step_flows.contact_loss += loss / 2;
-    island_.bodies[pair.body_b]->step_flows.contact_loss += loss / 2;
-    if (pair.friction > 0 && !pair.leads_out) rub(pair, velocity - speed * pair.normal);
+    worst = std::max(worst, std::abs(given - pair.given) * pair.mobility * h / pair.thickness);
+    press(pair, given, speed);
+    if (pair.friction > 0 && !pair.leads_out) rub(pair);
   }
   return worst;
 }

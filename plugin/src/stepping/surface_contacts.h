@@ -8,38 +8,36 @@
 
 namespace penalty {
 
-/// Where two features touch, or may in the coming drift.
+/// Where two features touch, or may in the coming drift: a row of constraints along the normal and two across it.
 struct TouchingPair {
-  std::size_t begin = 0, end = 0;        // of its particles
-  Vector3 normal = Vector3::Zero();      // from the point of the second feature to that of the first
+  std::size_t begin = 0, end = 0;  // of its particles
+  Matrix3 axes =
+      Matrix3::Zero();  // the normal, from the point of the second feature to that of the first; two tangents
   Vector3 difference = Vector3::Zero();  // the way between these points [m]
   Real gap = 0, thickness = 0;           // distance beyond the thickness; negative where some of that is lost [m]
   Real mobility = 0;                     // of an impulse along the normal [1/kg],
-  Real soft_mobility = 0;                // and of the particles alone
+  Real wanted = 0;                       // and the speed along it that is asked for, at least [m/s]
   Real friction = 0;
-  Real given = 0;                    // along the normal, so far in this drift [N s],
-  Vector3 rubbed = Vector3::Zero();  // and across it
-  bool leads_out = false;            // out of a closed surface that the first feature, a point, is inside of
-  int body_a = 0, body_b = 0;        // half of what is lost is booked to each
-  RigidBody* rigid = nullptr;        // one of the features is fixed in it, and takes
-  Real rigid_weight = 0;             // so much of an impulse: 1 the first, -1 the second,
-  Vector3 arm = Vector3::Zero();     // where the other one is, from its centre [m]
-
-  // What friction needs, found when it is needed first: see SurfaceContacts::rub.
-  bool has_inertia = false, is_held = false, can_turn = false;
-  Vector3 center = Vector3::Zero();
-  Matrix3 inverse_inertia = Matrix3::Zero();
+  Real given = 0;                                               // along the normal, so far in this drift [N s],
+  Eigen::Vector2<Real> rubbed = {0, 0};                         // and along the tangents
+  Eigen::Matrix2<Real> inertia = Eigen::Matrix2<Real>::Zero();  // along these [kg]; zero: no friction
+  bool has_friction_rows = false;                               // they are made when they are first needed
+  ContactMemory* memory = nullptr;                              // null: starts from nothing
+  bool leads_out = false;         // out of a closed surface that the first feature, a point, is inside of
+  int body_a = 0, body_b = 0;     // half of what is lost is booked to each
+  RigidBody* rigid = nullptr;     // one of the features is fixed in it, and takes
+  Real rigid_weight = 0;          // so much of an impulse: 1 the first, -1 the second,
+  Vector3 arm = Vector3::Zero();  // where the other one is, from its centre [m]
 };
 
-/// A particle of a touching pair: an impulse J on the pair gives it weight * J.
+/// A particle of a touching pair: an impulse J on the pair gives it weight * J, less what would turn the pair. The speed
+/// of a row is the sum over the particles of row.dot(velocity), and its unit impulse gives them these impulses.
 struct TouchingParticle {
   Real* velocity;
   const Real* position;
   Real weight, inverse_mass;
+  Matrix3 rows = Matrix3::Zero();  // along the normal and the tangents
 };
-
-/// A share of a mobility that is left without turning, below which nothing is pushed.
-inline constexpr Real least_mobility = 1e-6;
 
 inline Eigen::Map<Vector3> vector(Real* p) { return Eigen::Map<Vector3>(p); }
 inline Eigen::Map<const Vector3> vector(const Real* p) { return Eigen::Map<const Vector3>(p); }
@@ -68,7 +66,8 @@ struct SurfaceScratch {
 /// kept to round-off, but where features lie on each other, see SurfacePair::has_no_direction. A rigid body takes
 /// impulses at the point of the soft one, so there is nothing to leave out.
 ///
-/// Sweeps go on until they change nothing that matters, contacts with rigid bodies in each of them and once more at
+/// Contacts start from what they gave in the last substep: from the share of it that takes most of the approach away, so
+/// that a start is never worse than none. Sweeps go on until they change nothing that matters, contacts with rigid bodies in each of them and once more at
 /// the end. Then the guard lets no pair drift unless a plane separates it before and after: linear motions separated at
 /// both ends are separated throughout. What fails is swept again; what fails still moves on as one rigid body, which
 /// keeps both momenta where nothing is held.
@@ -95,11 +94,12 @@ class SurfaceContacts {
   int least_substeps() const { return least_substeps_; }
 
   /// Before a drift of `h` [s] in which the particles move by their velocities. `rigid_sweep` is one sweep over the
-  /// contacts with rigid bodies. `remaining`: of the step, the drift included [s].
-  void sweep(Real h, Real remaining, const RigidSweep& rigid_sweep);
+  /// contacts with rigid bodies. `remaining`: of the step, the drift included; `since`: that forces acted for since the
+  /// last sweeps [s].
+  void sweep(Real h, Real remaining, Real since, const RigidSweep& rigid_sweep);
 
   /// The same where nothing drifts: takes the approach that the last half kick left.
-  void close(Real h, const RigidSweep& rigid_sweep);
+  void close(Real h, Real since, const RigidSweep& rigid_sweep);
 
   /// After the drift.
   void drifted(Real h);
@@ -115,23 +115,37 @@ class SurfaceContacts {
 
  private:
   struct RigidMotion;  // of particles and rigid bodies that move as one
+  struct Turning;      // of the particles of a pair
 
   void take_positions();
   void take_velocities();
   bool refresh(Real h, Real remaining);
-  bool converge(Real h, const RigidSweep& rigid_sweep);
-  void collect();
-  void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out);
+  bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
+  void collect(Real h);
+  void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out,
+           ContactMemory* memory);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
   void lead_out(const SurfaceContact& contact);
-  static Real wanted_speed(const TouchingPair& pair, Real h);
   Real sweep_pairs(Real h, bool& hit);
-  Vector3 turn_of(TouchingPair& pair, const Vector3& direction) const;
-  Vector3 spin_of(const TouchingPair& pair, const Vector3& turn) const;
-  void push(const TouchingPair& pair, Real impulse, const Vector3& direction, const Vector3& turn);
-  void rub(TouchingPair& pair, Vector3 slip);
-  void find_inertia(TouchingPair& pair) const;
-  Vector3 relative_velocity(const TouchingPair& pair) const;
+  std::optional<Turning> turning_of(const TouchingPair& pair) const;
+  void make_row(const TouchingPair& pair, int row, const std::optional<Turning>& turning);
+  void make_normal_row(TouchingPair& pair);
+  void make_friction_rows(TouchingPair& pair);
+  Real mobility_of(const TouchingPair& pair, int row, int other) const;
+  Real speed_of(const TouchingPair& pair, int row) const;
+  Eigen::Vector2<Real> slip_of(const TouchingPair& pair) const;
+  template <class Share>
+  void push(const TouchingPair& pair, const Vector3& impulse, const Share& share);
+  void press(TouchingPair& pair, Real given, Real speed);
+  void start(Real since);
+  bool recall(TouchingPair& pair, Real since);
+  void rub(TouchingPair& pair);
+  void rub(TouchingPair& pair, Eigen::Vector2<Real> rubbed, const Eigen::Vector2<Real>& slip);
+  void book_recovery();
+  void book_loss(const TouchingPair& pair, Real loss);
+  std::span<TouchingParticle> particles_of(const TouchingPair& pair) const {
+    return std::span(scratch_.particles).subspan(pair.begin, pair.end - pair.begin);
+  }
 
   // The guard.
   void guard(Real h, Real remaining, const RigidSweep& rigid_sweep);

@@ -1,5 +1,6 @@
 // Where two bodies touch.
 #pragma once
+#include <algorithm>
 #include <limits>
 
 #include "penalty/contact/weighted_point.h"
@@ -18,6 +19,35 @@ struct Side {
   bool is_rigid() const { return body < 0; }
 };
 
+/// What a contact gave in the last substeps, be they of the last step: where the next one starts from. What comes once,
+/// as an impact does, does not come again.
+class ContactMemory {
+ public:
+  bool is_empty() const { return !(normal_force_ > 0); }
+
+  /// The impulse to start from, after forces have acted for `since` [s] from the last substep on [N s].
+  Vector3 start(Real since) const { return since * share_ * force_; }
+
+  /// Keeps `impulse` [N s], of forces that acted for `since` [s].
+  void keep(const Vector3& impulse, const Vector3& normal, Real since) {
+    const Real before = normal_force_;
+    force_ = since > 0 ? Vector3(impulse / since) : Vector3::Zero();
+    normal_force_ = normal.dot(force_);
+    share_ = normal_force_ > 0 ? std::clamp<Real>(before / normal_force_, 0, 1) : 0;
+  }
+
+ private:
+  Vector3 force_ = Vector3::Zero();  // [N]
+  Real normal_force_ = 0;            // [N]
+  Real share_ = 0;                   // so that the start is no more than either of the last two gave along the normal
+};
+
+/// Which share of impulses to start from makes most of the approach go away: `before` and `after` are what they work
+/// against it, before and after all are given. A start is never worse than none, so sweeps that end early gain no energy.
+inline Real best_share(Real before, Real after) {
+  return after > 0 ? std::clamp<Real>(before / (before - after), 0, 1) : 1;
+}
+
 /// The point of `a`, which belongs to particles, may not go below the plane through the point of `b` with unit normal
 /// `normal`, which points from b to a; or, with a positive `radius`, not come closer to the point of b than that: the
 /// surface of a ball. Where b is rigid the normal is fixed in its frame, else in the world.
@@ -29,8 +59,8 @@ struct Contact {
   Real deepest =
       std::numeric_limits<Real>::infinity();  // depth that is taken back; what is deeper stays where it is [m]
 
-  Real depth = 0;                     // largest depth during the step [m], reported
-  Vector3 impulse = Vector3::Zero();  // on a, of the last sweep [N s], reported
+  Real depth = 0;  // largest depth during the step [m], reported
+  ContactMemory memory = {};
 };
 
 /// The point of `a`, which belongs to particles, is held at that of `b`, which is fixed in a rigid body.

@@ -1,6 +1,7 @@
 // What is near what between two surfaces, or within one: kept from substep to substep, and from step to step.
 #pragma once
 #include "penalty/contact/closest_points.h"
+#include "penalty/contact/contact.h"
 #include "penalty/contact/contact_surface.h"
 
 namespace penalty {
@@ -14,6 +15,7 @@ struct FeaturePair {
   bool is_measured = false;            // `thickness` is final
   Real thickness = 0;                  // distance that is kept, the radius of a rigid surface included [m]
   Real at_refresh = 0, at_search = 0;  // distance then [m]
+  ContactMemory memory = {};           // of an impulse on the first
 };
 
 /// A point of one surface that lies inside the other, which is closed.
@@ -60,9 +62,9 @@ class SurfacePair {
   /// Calls visit(pair, limit) for each pair that may be as near as `limit` [m] beyond its thickness: a distance larger
   /// than what the coming drift can change.
   template <class Visit>
-  void visit_near(const Visit& visit) const {
-    for (const Couple& couple : couples_)
-      for (const FeaturePair& q : couple.near)
+  void visit_near(const Visit& visit) {
+    for (Couple& couple : couples_)
+      for (FeaturePair& q : couple.near)
         if (q.at_refresh - couple.used <= q.thickness + motion_reserve * couple.motion)
           visit(q, motion_reserve * couple.motion);
   }
@@ -136,6 +138,7 @@ class SurfacePair {
   BoxTree patch_tree_;           // of b
   std::uint64_t epoch_a_ = 0, epoch_b_ = 0;
   bool has_near_ = false, is_tangled_ = false;
+  std::vector<FeaturePair> pressed_;         // of a couple whose near pairs are found anew
   std::vector<char> tangled_a_, tangled_b_;  // marks of points; of the second only if it is another surface
   std::vector<EnclosedPoint> enclosed_;
 };

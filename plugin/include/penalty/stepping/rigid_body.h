@@ -27,10 +27,13 @@ struct RigidBody {
   /// Of the point at `arm` from the centre of mass, along the world axes [m]: velocity [m/s].
   Vector3 velocity_at(const Vector3& arm) const { return velocity + angular_velocity.cross(arm); }
 
-  /// Change of the velocity at `arm`, along `direction`, by a unit impulse there; times |direction|² [1/kg].
-  Real mobility_at(const Vector3& arm, const Vector3& direction) const {
-    const Vector3 moment = arm.cross(direction);
-    return direction.dot(inverse_mass.cwiseProduct(direction)) + moment.dot(inverse_inertia * moment);
+  /// Changes of the velocity at `arm`, by columns, by unit impulses there [1/kg].
+  Matrix3 mobility_at(const Vector3& arm) const {
+    Matrix3 cross;  // cross * x = arm x x
+    cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+    Matrix3 mobility = cross.transpose() * (inverse_inertia * cross);
+    mobility.diagonal() += inverse_mass;
+    return mobility;
   }
 
   /// Gives it an impulse [N s] at `arm`, booked in `impulse` and `angular_impulse`. Returns its work [J].
