@@ -171,13 +171,16 @@ void SurfacePair::mark_enclosed(const ContactSurface& points, ContactSurface& cl
     for (const int point : patch.points) {
       const Vector3 x = points.position(point);
       if (!box.contains(x, 0) || !(closed.winding_number(x) > 0.5)) continue;
-      if (closed.nearest(x).closest.difference.norm() < on_surface * thickness_) continue;
+      const Real distance = closed.nearest(x).closest.difference.norm();
+      if (distance < on_surface * thickness_) continue;
+      if (!is_tangled_ && !(distance < points.radius() - thickness_)) continue;
       marks[point] = is_enclosed;
-      enclosed_.push_back({point, &points == b_});
+      enclosed_.push_back({point, &points == b_, distance + points.radius()});
     }
 }
 
-// What does not pierce the other and yet lies inside, as a ball in a balloon, is where it should be.
+// What does not pierce the other and yet lies inside, as a ball in a balloon, is where it should be; but not a ball that
+// reaches out.
 void SurfacePair::untangle() {
   is_tangled_ = false;
   enclosed_.clear();
@@ -189,9 +192,10 @@ void SurfacePair::untangle() {
   tangled_b_.assign(b_->num_points(), 0);
   mark_pierced(*a_, *b_, tangled_a_, tangled_b_);
   mark_pierced(*b_, *a_, tangled_b_, tangled_a_);
-  if (!is_tangled_) return;
+  if (!is_tangled_ && !(b_->radius() > 0)) return;
   if (b_->is_closed()) mark_enclosed(*a_, *b_, tangled_a_);
   if (a_->is_closed()) mark_enclosed(*b_, *a_, tangled_b_);
+  is_tangled_ = is_tangled_ || !enclosed_.empty();
 }
 
 // What pierces, and whatever an enclosed point meets on its way out.

@@ -79,6 +79,9 @@ void ParticleContacts::begin(Real h, Real since) {
     if (-gap <= contact.deepest)
       row.recovery =
           std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
+    if (row.recovery > 0 && !row.is_obstacle && !row.is_held())
+      row.recovery =
+          std::min(row.recovery, std::max<Real>(row.normal.dot(relative_velocity(row)), 0) + recovery_acceleration * h);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
     row.normal_mobility = row.mobility(row.normal);
     rows_.push_back(row);

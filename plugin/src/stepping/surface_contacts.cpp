@@ -3,18 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "particle_contacts.h"
+
 namespace penalty {
 namespace {
 
-constexpr Real recovery_time = 0.05;    // in which lost thickness comes back [s],
-constexpr Real recovery_speed = 0.02;   // no faster than this [m/s]
-constexpr Real exit_speed = 0.2;        // of what is led out of a closed surface, at most [m/s]
-constexpr Real exit_acceleration = 20;  // likewise [m/s²]: what is pressed in stays
-constexpr Real slop = 0.02;             // share of the thickness that may be lost
-constexpr Real step_share = 0.5;        // of the thickness that a substep may bring surfaces closer
-constexpr Real common_direction = 0.2;  // share of the depths that must agree where enclosed points are led out
-constexpr int most_substeps = 400;      // to that end; beyond it the guard has more to do
-constexpr int fewest_substeps = 16;     // of a step in which surfaces are near
+constexpr Real lost_recovery_speed = 0.02;  // of lost thickness, at most [m/s]
+constexpr Real exit_speed = 0.2;            // of what is led out of a closed surface, at most [m/s]
+constexpr Real exit_acceleration = 20;      // likewise [m/s²]: what is pressed in stays
+constexpr Real slop = 0.02;                 // share of the thickness that may be lost
+constexpr Real step_share = 0.5;            // of the thickness that a substep may bring surfaces closer
+constexpr Real common_direction = 0.2;      // share of the depths that must agree where enclosed points are led out
+constexpr int most_substeps = 400;          // to that end; beyond it the guard has more to do
+constexpr int fewest_substeps = 16;         // of a step in which surfaces are near
 constexpr int most_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
@@ -78,6 +79,19 @@ void SurfaceContacts::begin_step(Real duration) {
       needed = std::max(needed, std::min<Real>(std::ceil(closing / (step_share * pair.thickness())), most_substeps));
   }
   least_substeps_ = static_cast<int>(needed);
+  for (const SurfaceContact& surface : island_.surfaces)
+    if (surface.rigid >= 0 && !surface.pair->enclosed().empty()) hold_inside(surface);
+}
+
+// Particles hold a body that is deep inside theirs where it is: each pushed off by its own, they would tear it apart.
+void SurfaceContacts::hold_inside(const SurfaceContact& surface) {
+  Real depth = 0;
+  for (const EnclosedPoint& enclosed : surface.pair->enclosed()) depth = std::max(depth, enclosed.depth);
+  for (Contact& contact : island_.contacts)
+    if (surface.rigid == contact.b.rigid && surface.body_a == contact.a.body && depth > contact.deepest) {
+      contact.deepest = 0;
+      if (held_inside_.empty() || held_inside_.back() != surface.pair) held_inside_.push_back(surface.pair);
+    }
 }
 
 bool SurfaceContacts::refresh(Real h, Real remaining) {
@@ -130,12 +144,18 @@ void SurfaceContacts::collect(Real h) {
       const Real limit = q.thickness + reach;
       if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory);
     });
-    if (!contact.pair->enclosed().empty()) lead_out(contact);
+    const bool is_held = std::find(held_inside_.begin(), held_inside_.end(), contact.pair) != held_inside_.end();
+    if (!contact.pair->enclosed().empty() && !is_held) lead_out(contact);
   }
-  for (TouchingPair& pair : scratch_.pairs)
-    pair.wanted = pair.gap >= 0 ? -pair.gap / h
-                                : std::clamp<Real>((-pair.gap - slop * pair.thickness) / std::max(recovery_time, h), 0,
-                                                   pair.leads_out ? exit_speed : recovery_speed);
+  for (TouchingPair& pair : scratch_.pairs) {
+    pair.wanted = -pair.gap / h;
+    if (pair.gap >= 0) continue;
+    const Real recovery = (-pair.gap - slop * pair.thickness) / std::max(recovery_time, h);
+    const Real fastest = pair.leads_out ? exit_speed : lost_recovery_speed,
+               acceleration = pair.leads_out ? exit_acceleration : recovery_acceleration;
+    pair.wanted =
+        std::clamp<Real>(recovery, 0, std::min(fastest, std::max<Real>(speed_of(pair, 0), 0) + acceleration * h));
+  }
 }
 
 void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest,
@@ -241,7 +261,7 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
     ways.push_back({{.points = {enclosed.point, t0, t1, t2},
                      .are_edges = false,
                      .from_b = enclosed.of_b,
-                     .thickness = pair.thickness()},
+                     .thickness = pair.kept_distance()},
                     nearest.closest,
                     inwards.dot(outwards) < 0});
     if (!ways.back().is_inside) continue;
@@ -291,8 +311,7 @@ Real SurfaceContacts::sweep_pairs(Real h, bool& hit) {
   for (TouchingPair& pair : scratch_.pairs) {
     const Real speed = speed_of(pair, 0);
     if (speed >= pair.wanted && pair.given == 0) continue;
-    Real given = std::max<Real>(pair.given + (pair.wanted - speed) / pair.mobility, 0);
-    if (pair.leads_out) given = std::min(given, exit_acceleration * h / pair.mobility);
+    const Real given = std::max<Real>(pair.given + (pair.wanted - speed) / pair.mobility, 0);
     if (given == pair.given) continue;
     hit = true;
     worst = std::max(worst, std::abs(given - pair.given) * pair.mobility * h / pair.thickness);

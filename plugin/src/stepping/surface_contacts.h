@@ -58,7 +58,7 @@ struct SurfaceScratch {
 /// Each pair of features that may touch in a drift of h is a one-sided constraint on velocities along the direction n
 /// between its closest points as they are at this instant: of the distance D and the thickness d that is kept, the
 /// relative normal speed u is asked to be u >= -(D - d)/h while there is a gap, and u >= 0 when there is none; thickness
-/// that was lost comes back at (d - D) / 0.05 s, at 2 cm/s at most. The impulse goes to both features by weight and inverse
+/// that was lost comes back at (d - D) / 0.05 s, at 2 cm/s and 100 m/s² at most. The impulse goes to both features by weight and inverse
 /// mass. There is no stiffness, no sign and no memory of sides: the two sides of a cloth are the same.
 ///
 /// Friction acts at two points that are a thickness apart, so it would turn the particles of the pair: the part of
@@ -73,7 +73,7 @@ struct SurfaceScratch {
 /// keeps both momenta where nothing is held.
 ///
 /// What starts out pierced is left to pass; points inside a closed surface are led out of it, all in one direction,
-/// at 0.2 m/s and 20 m/s² at most.
+/// at 0.2 m/s and 20 m/s² at most, unless it is a rigid body so deep that the particles in it hold it.
 class SurfaceContacts {
  public:
   /// Once over the contacts with and between rigid bodies; returns whether it is to be done again.
@@ -126,6 +126,7 @@ class SurfaceContacts {
            ContactMemory* memory);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
   void lead_out(const SurfaceContact& contact);
+  void hold_inside(const SurfaceContact& surface);
   Real sweep_pairs(Real h, bool& hit);
   std::optional<Turning> turning_of(const TouchingPair& pair) const;
   void make_row(const TouchingPair& pair, int row, const std::optional<Turning>& turning);
@@ -172,6 +173,7 @@ class SurfaceContacts {
   std::vector<int> zone_;             // of particles that move as one: another of these; empty: none do
   std::vector<char> may_touch_;       // each body
   std::vector<Real> lost_thickness_;  // of each body, the most in this step [m]
+  std::vector<const SurfacePair*> held_inside_;  // what is too deep to be led out
   int least_substeps_ = 1;
   long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step
   Real outside_work_ = 0;

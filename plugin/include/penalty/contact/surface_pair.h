@@ -22,6 +22,7 @@ struct FeaturePair {
 struct EnclosedPoint {
   int point;
   bool of_b;
+  Real depth;  // the radius of a rigid surface included [m]
 };
 
 /// Pairs of features of two surfaces, found in three steps, each of which looks further ahead than the next and is
