@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "body_settings.h"
 #include "face_tree.h"
 #include "penalty/math/text.h"
 #include "world_step.h"
@@ -68,7 +69,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
     held = &bodies.add(body, std::move(field), options);
   }
   keep_face_tree(body);
-  return {attached_->bodies, body, held->serial};
+  return {attached_->bodies, body, held->serial, penalty::unused_settings(body)};
 }
 
 void AttachedBodies::detach(const btSoftBody& body) {

@@ -5,22 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "body_settings.h"
 #include "face_tree.h"
 #include "world_step.h"
 
 namespace penalty {
-namespace {
-
-// As Bullet does before it predicts, but with a tree over the faces that is always made, and made in time.
-void update_constants(btSoftBody& body) {
-  if (body.m_bUpdateRtCst) {
-    body.m_bUpdateRtCst = false;
-    body.updateConstants();
-  }
-  keep_face_tree(body);
-}
-
-}  // namespace
 
 PenaltyDeformableBodySolver::PenaltyDeformableBodySolver() = default;
 PenaltyDeformableBodySolver::~PenaltyDeformableBodySolver() = default;
@@ -65,7 +54,11 @@ void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
   switch_off_soft_contact();
   const std::span<btSoftBody* const> bodies = listed(m_softBodies);
   const auto stepped = attached_->step(bodies, time_step, true);
-  for (HeldBody* held : stepped) update_constants(*held->body);
+  // As Bullet does before it predicts, but with a tree over the faces that is always made, and made in time.
+  for (HeldBody* held : stepped) {
+    update_constants(*held->body);
+    keep_face_tree(*held->body);
+  }
   // What Bullet's prediction does to ours is overwritten below.
   if (!all_attached()) predict_others(time_step);
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "body_anchors.h"
+#include "body_settings.h"
 #include "convert.h"
 #include "obstacles.h"
 #include "sleeping.h"
@@ -23,32 +24,6 @@ void shield(const Call& call, const Failed& failed) noexcept {
   } catch (...) {
     failed("something was thrown that is no std::exception");
   }
-}
-
-Real zero_if_finite(const btVector3& v) { return 0 * Real(v.x()) + 0 * Real(v.y()) + 0 * Real(v.z()); }
-
-// What Bullet's own part of the step would spread over the nodes, and on into its trees, for good. Null: nothing.
-const char* not_finite_setting(const btSoftBody& body) {
-  const btSoftBodyWorldInfo& info = *body.m_worldInfo;
-  const btSoftBody::Config& config = body.m_cfg;
-  const std::pair<Real, const char*> settings[] = {
-      {zero_if_finite(info.m_gravity), "the gravity of its world info is not finite"},
-      {Real(body.m_gravityFactor), "its gravity factor is not finite"},
-      {Real(body.getCollisionShape()->getMargin()), "its collision margin is not finite"},
-      {Real(config.timescale), "m_cfg.timescale is not finite"},
-      {Real(config.kDF), "its friction, m_cfg.kDF, is not finite"},
-      {Real(config.kDP), "m_cfg.kDP is not finite"},
-      {Real(config.drag), "m_cfg.drag is not finite"},
-      {Real(config.kDG), "m_cfg.kDG is not finite"},
-      {Real(config.kLF), "m_cfg.kLF is not finite"},
-      {Real(config.kPR), "m_cfg.kPR is not finite"},
-      {Real(config.kVC), "m_cfg.kVC is not finite"},
-      {Real(config.kMT), "m_cfg.kMT is not finite"},
-      {zero_if_finite(body.m_windVelocity), "its wind velocity is not finite"},
-  };
-  for (const auto& [value, problem] : settings)
-    if (!std::isfinite(value)) return problem;
-  return nullptr;
 }
 
 void set_problem(StepReport& report, const char* what, int particle, const char* then) noexcept {
@@ -145,8 +120,10 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   SteppedBody& stepped = held.stepped;
   btSoftBody& body = *held.body;
   held.read_nodes();
+  const char* problem = not_finite_setting(body);
+  if (!problem) add_forces_of_settings(body, duration);
   if (held.nodes.read_forces(stepped.external_forces)) stepped.positions_changed();
-  if (const char* problem = not_finite_setting(body)) {
+  if (problem) {
     held.hold(problem, false);
     stepped.report.finite = false;
     return;
@@ -160,7 +137,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   held.measure();
   held.anchors.clear();
   if (has_anchors(body)) {
-    if (const char* problem = read_anchors(held, WorldObjects(broadphase_))) return held.hold(problem, true);
+    if (const char* trouble = read_anchors(held, WorldObjects(broadphase_))) return held.hold(trouble, true);
   }
   WorldIsland island;
   island.held.push_back(&held);

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "penalty/bullet/body_surface.h"
@@ -50,8 +52,9 @@ struct CouplingPoint {
 /// body and solver are deleted, in whatever order.
 class AttachedBody {
  public:
-  AttachedBody(const std::shared_ptr<const HeldBodies>& solver, const btSoftBody& body, std::uintptr_t serial_number)
-      : bodies_(solver), address_(&body), serial_number_(serial_number) {}
+  AttachedBody(const std::shared_ptr<const HeldBodies>& solver, const btSoftBody& body, std::uintptr_t serial_number,
+               std::vector<std::string> unused_settings)
+      : bodies_(solver), address_(&body), serial_number_(serial_number), unused_settings_(std::move(unused_settings)) {}
 
   /// Carried by this body and no other, whatever memory it lies in.
   std::uintptr_t serial_number() const { return serial_number_; }
@@ -60,10 +63,14 @@ class AttachedBody {
   /// the next world step on; a body that is put back is there again.
   bool is_gone() const;
 
+  /// What was set on the body when it was attached, and does nothing from then on: a line each, with what to use instead.
+  const std::vector<std::string>& unused_settings() const { return unused_settings_; }
+
  private:
   std::weak_ptr<const HeldBodies> bodies_;
   const btSoftBody* address_;  // compared, never followed
   std::uintptr_t serial_number_;
+  std::vector<std::string> unused_settings_;
 };
 
 /// What both solvers of the plugin offer: soft bodies, each with a potential field, stepped inside the world step.
