@@ -80,6 +80,32 @@ TEST_P(Concave, HeightfieldsAreTwoSidedAsTheyAreForRigidBodies) {
     }
 }
 
+// A ridge beneath the triangles of a coarse body, between its nodes, is taken away.
+TEST_P(Concave, AnEditedHeightfieldHoldsNothingWhereItWas) {
+  std::vector<float> heights(81, 0);
+  for (int row = 0; row < 9; ++row) heights[9 * row + 4] = 0.5F;
+  Simulation other(GetParam());
+  other.set_gravity({0, -9.81, 0});
+  other.add_rigid(
+      std::make_unique<btHeightfieldTerrainShape>(9, 9, heights.data(), btScalar(-1), btScalar(1), 1, false), 0,
+      {0, 0, 0});
+  const btSoftBody& body =
+      other.add_jelly(make_box({3, 0.4, 1}, {1, 1, 1}), {.stiffness = 1000,
+                                                         .shift = {-1.5, 0.6, -0.5},
+                                                         .body = {.margin = 0.02, .friction = 1},
+                                                         .attach = {.step = {.damping_time = 0.02}}});
+  const auto lowest = [&] {
+    Real low = 1;
+    for (int i = 0; i < body.m_nodes.size(); ++i) low = std::min(low, Real(body.m_nodes[i].m_x.y()));
+    return low;
+  };
+  for (int k = 0; k < 60; ++k) other.step(frame);
+  EXPECT_GT(lowest(), 0.4);
+  std::fill(heights.begin(), heights.end(), 0.0F);
+  for (int k = 0; k < 120; ++k) other.step(frame);
+  EXPECT_NEAR(lowest(), 0.04, 0.05);
+}
+
 TEST_P(Concave, ADynamicMeshIsCarried) {
   for (const bool turned : {false, true}) {
     Simulation other(GetParam());

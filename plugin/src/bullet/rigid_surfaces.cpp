@@ -28,17 +28,18 @@ void RigidSurfaces::begin_step() {
   ++step_;
 }
 
-RigidSurfaces::Object& RigidSurfaces::refreshed(const btCollisionObject& object, const Box& box) {
+// Each body knows its own part of a concave object.
+RigidSurfaces::Object& RigidSurfaces::refreshed(const HeldBody& held, const btCollisionObject& object, const Box& box) {
   const btCollisionShape& shape = *object.getCollisionShape();
-  Object& known = objects_[object.getBroadphaseHandle()->m_uniqueId];
+  const bool is_of_triangles = is_concave(shape);
+  Object& known = objects_[{is_of_triangles ? held.order : 0, object.getBroadphaseHandle()->m_uniqueId}];
   known.used = step_;
-  std::vector<Real> fingerprint = fingerprint_of(shape);
   const bool is_covered =
-      !is_concave(shape) || (known.covered.contains(box.low, 0) && known.covered.contains(box.high, 0));
-  if (is_covered && fingerprint == known.fingerprint) return known;
+      !is_of_triangles || (known.covered.contains(box.low, 0) && known.covered.contains(box.high, 0));
+  if (is_covered && fingerprint_of(shape, known.covered) == known.fingerprint) return known;
   const Vector3 padding = padding_share * (box.high - box.low);
   known.covered = {box.low - padding, box.high + padding};
-  known.fingerprint = std::move(fingerprint);
+  known.fingerprint = fingerprint_of(shape, known.covered);
   known.edges = edges_of(shape, known.covered);
   known.surfaces.clear();
   for (const ShapeEdges& edges : known.edges)
@@ -52,7 +53,7 @@ std::vector<SurfacePair*> RigidSurfaces::near(HeldBody& held, const btCollisionO
   if (soft.edges().empty()) return found;
   const Matrix3 to_object = to_matrix(object.getWorldTransform().getBasis()).transpose();
   const Box local = transformed(box, to_object, -(to_object * to_vector(object.getWorldTransform().getOrigin())));
-  Object& known = refreshed(object, local);
+  Object& known = refreshed(held, object, local);
   for (std::size_t k = 0; k < known.edges.size(); ++k) {
     if (!known.edges[k].reach_into(local) || !are_needed(known.edges[k], soft)) continue;
     const std::shared_ptr<ContactSurface>& rigid = known.surfaces[k];

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "penalty/contact/surface_pair.h"
@@ -38,9 +39,10 @@ class RigidSurfaces {
     int used = 0;
   };
 
-  Object& refreshed(const btCollisionObject& object, const Box& box);
+  Object& refreshed(const HeldBody& held, const btCollisionObject& object, const Box& box);
 
-  std::map<int, Object> objects_;  // by the unique id of their broadphase proxies
+  // By the order of the body that sees a part of it, of one of triangles, and the unique id of their broadphase proxies.
+  std::map<std::pair<std::uint64_t, int>, Object> objects_;
   std::map<std::array<std::uint64_t, 3>, Pair>
       pairs_;  // by the order of the body, the object, and which of its surfaces
   int step_ = 0;

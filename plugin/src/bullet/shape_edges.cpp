@@ -13,7 +13,9 @@
 #include <LinearMath/btConvexHullComputer.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numbers>
 #include <tuple>
@@ -234,7 +236,24 @@ void append(const btCollisionShape& shape, const Box& box, List& list) {
   }
 }
 
-void append_numbers(const btCollisionShape& shape, std::vector<Real>& numbers) {
+/// A number that is another one where vertices were moved.
+class Hash final : public btTriangleCallback {
+ public:
+  void add(const btVector3& v) {
+    for (int axis = 0; axis < 3; ++axis)
+      value_ = (value_ ^ std::bit_cast<std::uint64_t>(Real(v[axis]))) * 0x100000001b3;
+    value_ ^= value_ >> 29;
+  }
+  void processTriangle(btVector3* triangle, int, int) override {
+    for (int k = 0; k < 3; ++k) add(triangle[k]);
+  }
+  Real value() const { return static_cast<Real>(value_ >> 11); }  // as many digits as a Real holds
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325;
+};
+
+void append_numbers(const btCollisionShape& shape, const Box& box, std::vector<Real>& numbers) {
   const auto add = [&](const btVector3& v) { numbers.insert(numbers.end(), {Real(v.x()), Real(v.y()), Real(v.z())}); };
   btVector3 low, high;
   shape.getAabb(btTransform::getIdentity(), low, high);
@@ -247,10 +266,19 @@ void append_numbers(const btCollisionShape& shape, std::vector<Real>& numbers) {
       const btTransform& transform = compound.getChildTransform(child);
       for (int row = 0; row < 3; ++row) add(transform.getBasis()[row]);
       add(transform.getOrigin());
-      append_numbers(*compound.getChildShape(child), numbers);
+      const Matrix3 rotation = to_matrix(transform.getBasis()).transpose();
+      append_numbers(*compound.getChildShape(child),
+                     transformed(box, rotation, -(rotation * to_vector(transform.getOrigin()))), numbers);
     }
   } else if (shape.getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE) {
-    numbers.push_back(static_cast<const btConvexHullShape&>(shape).getNumPoints());
+    const auto& hull = static_cast<const btConvexHullShape&>(shape);
+    Hash hash;
+    for (int k = 0; k < hull.getNumPoints(); ++k) hash.add(hull.getUnscaledPoints()[k]);
+    numbers.push_back(hash.value());
+  } else if (shape.isConcave() && (box.low.array() <= box.high.array()).all()) {
+    Hash hash;
+    static_cast<const btConcaveShape&>(shape).processAllTriangles(&hash, to_bullet(box.low), to_bullet(box.high));
+    numbers.push_back(hash.value());
   }
 }
 
@@ -278,9 +306,9 @@ List edges_of(const btCollisionShape& shape, const Box& box) {
   return list;
 }
 
-std::vector<Real> fingerprint_of(const btCollisionShape& shape) {
+std::vector<Real> fingerprint_of(const btCollisionShape& shape, const Box& box) {
   std::vector<Real> numbers;
-  append_numbers(shape, numbers);
+  append_numbers(shape, box, numbers);
   return numbers;
 }
 

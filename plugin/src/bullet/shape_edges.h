@@ -27,8 +27,8 @@ struct ShapeEdges {
 /// none.
 std::vector<ShapeEdges> edges_of(const btCollisionShape& shape, const Box& box);
 
-/// Numbers that are others when corners and edges may be. `box` counts for concave shapes only, see `is_concave`.
-std::vector<Real> fingerprint_of(const btCollisionShape& shape);
+/// Numbers that are others when corners and edges may be; of a concave shape, see `is_concave`, those in `box`.
+std::vector<Real> fingerprint_of(const btCollisionShape& shape, const Box& box);
 
 /// It, or a part of it, is of triangles.
 bool is_concave(const btCollisionShape& shape);
