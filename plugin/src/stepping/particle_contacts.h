@@ -29,9 +29,9 @@ struct ParticleContactRow {
   bool is_held() const { return point_mobility <= 0; }
   Vector3 velocity_of_other() const;
 
-  /// Of both, along the impulse; times its square.
-  Real mobility(const Vector3& impulse) const {
-    return point_mobility * impulse.squaredNorm() + (is_obstacle ? 0 : impulse.dot(other_mobility * impulse));
+  /// Of both, along an impulse; times its square.
+  Real mobility(const Vector3& given) const {
+    return point_mobility * given.squaredNorm() + (is_obstacle ? 0 : given.dot(other_mobility * given));
   }
 };
 
