@@ -38,10 +38,11 @@ struct ParticleContactRow {
 /// One-sided constraints on velocities, met by sequential impulses that are summed and clipped contact by contact, as
 /// those of RigidContacts: a sweep may take back what an earlier one gave too much. Of the gap g and the relative normal
 /// speed u a contact asks u >= -g/h while the gap is open and u >= 0 when it is closed: it stops approach. Depth beyond
-/// the slop of the body is taken back: there it asks u >= depth / 0.05 s, at most half a metre a second, which bodies that can
-/// move reach at 100 m/s² at most, and what that gives is work from outside. So is what driven particles give to a body that they push; two that cannot move are left
-/// alone. The impulse goes to side a and, with the opposite sign, to side b: to a rigid body at the point of a, so that
-/// both momenta are kept to round-off. Friction is clipped to Coulomb's cone.
+/// the slop of the body is taken back: there it asks u >= depth / 0.05 s, at most half a metre a second, which two bodies
+/// that can move reach at 100 m/s² at most, and what that gives is work from outside. So is what driven particles give to
+/// a body that they push; two that cannot move are left alone. The impulse goes to side a and, with the opposite sign, to
+/// side b: to a rigid body at the point of a, so that both momenta are kept to round-off. Friction is clipped to Coulomb's
+/// cone.
 class ParticleContacts {
  public:
   explicit ParticleContacts(Island& island);

@@ -10,9 +10,8 @@ namespace penalty {
 
 /// Where two features touch, or may in the coming drift: a row of constraints along the normal and two across it.
 struct TouchingPair {
-  std::size_t begin = 0, end = 0;  // of its particles
-  Matrix3 axes =
-      Matrix3::Zero();  // the normal, from the point of the second feature to that of the first; two tangents
+  std::size_t begin = 0, end = 0;        // of its particles
+  Matrix3 axes = Matrix3::Zero();        // the normal, from the second feature to the first, and two tangents
   Vector3 difference = Vector3::Zero();  // the way between these points [m]
   Real gap = 0, thickness = 0;           // distance beyond the thickness; negative where some of that is lost [m]
   Real mobility = 0;                     // of an impulse along the normal [1/kg],

@@ -9,7 +9,7 @@
 namespace penalty {
 namespace {
 
-constexpr Real least_mobility = 1e-6;  // relative to that along the normal, below which nothing is rubbed
+constexpr Real least_mobility = 1e-6;  // that is left without turning, relative to all along the normal
 
 using Vector2 = Eigen::Vector2<Real>;
 
@@ -63,8 +63,12 @@ void SurfaceContacts::make_row(const TouchingPair& pair, int row, const std::opt
 }
 
 void SurfaceContacts::make_normal_row(TouchingPair& pair) {
-  make_row(pair, 0, pair.leads_out && !pair.rigid ? turning_of(pair) : std::nullopt);
+  make_row(pair, 0, std::nullopt);
   pair.mobility = mobility_of(pair, 0, 0);
+  if (!pair.leads_out || pair.rigid) return;
+  make_row(pair, 0, turning_of(pair));
+  const Real mobility = mobility_of(pair, 0, 0);
+  pair.mobility = mobility > least_mobility * pair.mobility ? mobility : 0;
 }
 
 // A pinned particle and a rigid body take up any moment; particles in one line have no friction.
