@@ -72,6 +72,8 @@ std::vector<std::string> unused_settings(const btSoftBody& body) {
       {"m_cfg.kAHR", config.kAHR, btScalar(0.7), "for a soft anchor use its influence, or couple() with an Attachment"},
       {"m_cfg.m_maxStress", config.m_maxStress, 0, "stress is what the field gives"},
       {"the rest length scale", body.m_restLengthScale, 1, "make the field from the rest shape that is wanted"},
+      {"m_dampingCoefficient", body.m_dampingCoefficient, 1, "StepOptions::damping_time damps"},
+      {"m_repulsionStiffness", body.m_repulsionStiffness, btScalar(0.5), hard},
       {"m_maxSpeedSquared", body.m_maxSpeedSquared, 0, "speeds have no limit; StepOptions::damping_time damps"},
   };
   std::vector<std::string> unused;
