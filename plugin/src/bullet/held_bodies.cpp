@@ -16,8 +16,8 @@ HeldBody::HeldBody(btSoftBody& soft_body, PotentialField potential_field, const 
   start = stepped.particles.positions;
 }
 
-void HeldBody::read_nodes() {
-  const NodeChanges changes = nodes.read(stepped.particles);
+void HeldBody::read_nodes(Real duration) {
+  const NodeChanges changes = nodes.read(stepped.particles, duration);
   if (changes.moved) {
     start = stepped.particles.positions;
     stepped.positions_changed();
@@ -46,6 +46,7 @@ void HeldBody::hold(const char* problem, bool stopped) noexcept {
   } catch (const std::bad_alloc&) {
     report.problem = "out of memory";  // short enough to need none
   }
+  nodes.arrive(stepped.particles, start);
   stepped.particles.positions = start;
   if (stopped) {
     stepped.particles.velocities.setZero();

@@ -60,8 +60,8 @@ struct HeldBody {
 
   Identity identity() const { return {body, serial}; }
 
-  /// Adds what others changed to the state.
-  void read_nodes();
+  /// Adds what others changed to the state; pinned nodes that were moved go there in `duration` [s], see Nodes::read.
+  void read_nodes(Real duration = 0);
 
   /// Finds the box and the largest speed, once for all who ask where the body may come in the step.
   void measure();

@@ -1,5 +1,6 @@
 #include "nodes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -52,12 +53,15 @@ void Nodes::reject(int node, const char* what) {
   if (rejected_.node < 0) rejected_ = {node, what};
 }
 
-NodeChanges Nodes::read(Particles& particles) {
+NodeChanges Nodes::read(Particles& particles, Real duration) {
   if (body_->m_nodes.size() != particles.size())
     throw std::logic_error("the soft body has " + std::to_string(body_->m_nodes.size()) + " nodes, had " +
                            std::to_string(particles.size()) + " when it was attached: detach it, attach it again");
   NodeChanges changes;
   rejected_ = {};
+  for (const LedNode& led : led_)  // of a step that was given up
+    particles.velocities.col(led.node).head<3>() = led.velocity;
+  led_.clear();
   for (int i = 0; i < particles.size(); ++i) {
     btSoftBody::Node& node = body_->m_nodes[i];
     // As most are, step after step.
@@ -74,14 +78,19 @@ NodeChanges Nodes::read(Particles& particles) {
       node.m_v = written_velocities_[i];
       continue;
     }
-    if (!dx.isZero()) {
-      particles.positions.col(i).head<3>() += to_vector(dx);
-      written_positions_[i] = node.m_x;
-      changes.moved = true;
-    }
     if (!dv.isZero()) {
       particles.velocities.col(i).head<3>() += to_vector(dv);
       written_velocities_[i] = node.m_v;
+    }
+    if (!dx.isZero() && node.m_im > 0) {
+      particles.positions.col(i).head<3>() += to_vector(dx);
+      written_positions_[i] = node.m_x;
+      changes.moved = true;
+    } else if (!dx.isZero()) {
+      // What a node flew at before it was pinned, it is not to fly on at.
+      const bool keeps_velocity = read_inverse_masses_[i] == 0 || !dv.isZero();
+      const Vector3 velocity = particles.velocities.col(i).head<3>();
+      led_.push_back({i, to_vector(node.m_x), keeps_velocity ? velocity : Vector3::Zero()});
     }
     if (node.m_im != read_inverse_masses_[i]) {
       changes.lighter = changes.lighter || node.m_im > read_inverse_masses_[i];
@@ -89,7 +98,41 @@ NodeChanges Nodes::read(Particles& particles) {
       particles.inverse_masses[i] = node.m_im;
     }
   }
+  if (!led_.empty()) lead(particles, duration, changes);
   return changes;
+}
+
+void Nodes::lead(Particles& particles, Real duration, NodeChanges& changes) {
+  const std::vector<Real>& inverse_masses = particles.inverse_masses;
+  const bool jump = !(duration > 0) || changes.moved ||
+                    std::none_of(inverse_masses.begin(), inverse_masses.end(), [](Real im) { return im > 0; });
+  for (const LedNode& led : led_) {
+    auto position = particles.positions.col(led.node).head<3>();
+    if (jump) {
+      position = led.place;
+      written_positions_[led.node] = body_->m_nodes[led.node].m_x;
+      particles.velocities.col(led.node).head<3>() = led.velocity;
+    } else {
+      particles.velocities.col(led.node).head<3>() = (led.place - position) / duration;
+    }
+  }
+  if (!jump) return;
+  led_.clear();
+  changes.moved = true;
+}
+
+void Nodes::arrive(Particles& particles, PackedVectors& start) {
+  for (const auto& [node, place, velocity] : led_) {
+    particles.positions.col(node).head<3>() = start.col(node).head<3>() = place;
+    particles.velocities.col(node).head<3>() = velocity;
+  }
+  led_.clear();
+}
+
+bool Nodes::has_moved_pins() const {
+  for (int i = 0; i < std::min<int>(body_->m_nodes.size(), written_positions_.size()); ++i)
+    if (body_->m_nodes[i].m_im == 0 && body_->m_nodes[i].m_x != written_positions_[i]) return true;
+  return false;
 }
 
 bool Nodes::read_forces(PackedVectors& forces) {

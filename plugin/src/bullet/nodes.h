@@ -14,6 +14,13 @@ struct NodeChanges {
   bool lighter = false;  // larger inverse masses
 };
 
+/// A pinned node in a step that takes it to where the application put it.
+struct LedNode {
+  int node;
+  Vector3 place;     // where it will be [m]
+  Vector3 velocity;  // that it has besides, again when it is there [m/s]
+};
+
 /// A number in a node that is no number, and was set back to what it was.
 struct RejectedNode {
   int node = -1;          // -1: none was
@@ -30,8 +37,17 @@ class Nodes {
   Nodes(btSoftBody& body, Particles& particles);
 
   /// Adds what others changed. Numbers that are not finite, and inverse masses that are negative, are set back, see
-  /// `rejected`. Throws std::logic_error if the body has another number of nodes than it had.
-  NodeChanges read(Particles& particles);
+  /// `rejected`. Pinned nodes that were moved, while no free one was, get the velocity that takes them there in
+  /// `duration` [s]: until `arrive` they are where they were. Without a duration, or a free node, they jump. Throws
+  /// std::logic_error if the body has another number of nodes than it had.
+  NodeChanges read(Particles& particles, Real duration = 0);
+
+  /// Ends the ways that `read` began: these particles are where they were led to, and so is where a failed step goes
+  /// back to, at the velocities that the application gave them.
+  void arrive(Particles& particles, PackedVectors& start);
+
+  /// Whether somebody moved pinned nodes since the nodes were last written.
+  bool has_moved_pins() const;
 
   /// Takes the forces of btSoftBody::addForce; empty if there are none. Returns whether they, or those of the last
   /// step, count.
@@ -74,10 +90,12 @@ class Nodes {
 
  private:
   void reject(int node, const char* what);
+  void lead(Particles& particles, Real duration, NodeChanges& changes);
 
   btSoftBody* body_;
   btAlignedObjectArray<btVector3> written_positions_, written_velocities_;
   std::vector<btScalar> read_inverse_masses_;
+  std::vector<LedNode> led_;
   RejectedNode rejected_;
 };
 

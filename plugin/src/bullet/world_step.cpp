@@ -94,8 +94,9 @@ void AttachedBodies::World::hold_all(std::span<btSoftBody* const> listed, const 
 void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real duration) {
   stepped_.reserve(listed.size());
   for (btSoftBody* body : listed)
-    if (bodies->find(*body)) {
+    if (const HeldBody* held = bodies->find(*body)) {
       broadphase_ = body->getWorldInfo()->m_broadphase;  // which attach asked for
+      if (!body->isActive() && held->nodes.has_moved_pins()) body->activate(true);
       wake_if_hit(*body);
     }
   Surfaces::wake_touched(*bodies, listed, duration);
@@ -119,7 +120,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
 void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   SteppedBody& stepped = held.stepped;
   btSoftBody& body = *held.body;
-  held.read_nodes();
+  held.read_nodes(duration);
   const char* problem = not_finite_setting(body);
   if (!problem) add_forces_of_settings(body, duration);
   if (held.nodes.read_forces(stepped.external_forces)) stepped.positions_changed();
@@ -181,11 +182,13 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
   for (HeldBody* held : island.held) {
     if (held->outcome == StepOutcome::held) continue;
     held->outcome = StepOutcome::stepped;
+    held->nodes.arrive(held->stepped.particles, held->start);
     StepReport& report = held->stepped.report;
-    if (!report.finite)
+    if (!report.finite) {
+      held->stepped.positions_changed();
       set_problem(report, "the step did not stay finite and was undone; look at particle ", report.first_bad_particle,
                   "");
-    else if (!held->friction_is_finite)
+    } else if (!held->friction_is_finite)
       shield([&] { report.problem = "the friction of an object that it touches is not finite, and was left out"; },
              [](const char*) {});
     report_rejected(*held);

@@ -144,7 +144,7 @@ class AttachedBodies {
   void refresh(const btSoftBody& body);
 
   /// Reads what the application changed since the last step now rather than at the next step, so that `particles` shows
-  /// it.
+  /// it. Pinned nodes that were moved jump then: without this call they move through the next step.
   void synchronize(const btSoftBody& body);
 
  protected:
