@@ -49,6 +49,29 @@ TEST(Allocation, AnImplicitStepNeedsNone) {
   }
 }
 
+TEST(Allocation, AnchorsNeedNoneInASubstep) {
+  std::array<long, 2> counts{};
+  for (const std::size_t many : {0, 1}) {
+    Body beam = make_beam_body(1);
+    beam.body.options.substeps = many ? 400 : 200;
+    Island island{.bodies = {&beam.body},
+                  .rigid_bodies = {make_sphere(300, 0.5, {2, 1.5, 0.5}), make_sphere(300, 0.5, {2, -0.5, 0.5})}};
+    for (int i = 0; i < 6; ++i)
+      for (const int rigid : {0, 1})
+        if (rigid == 0 || i < 2)
+          island.anchors.push_back(
+              {.a = Side::of_particles(0, WeightedPoint::at_particle(i)),
+               .b = Side::of_rigid(rigid,
+                                   beam.position(i) - island.rigid_bodies[static_cast<std::size_t>(rigid)].position)});
+    penalty::advance(island, 1.0 / 60);
+    const long before = num_allocations;
+    penalty::advance(island, 1.0 / 60);
+    counts[many] = num_allocations - before;
+    EXPECT_GE(beam.body.report.substeps, many ? 400 : 200);
+  }
+  EXPECT_EQ(counts[0], counts[1]);
+}
+
 TEST(Allocation, ARetriedStepNeedsNone) {
   Body beam = make_beam_body(1);
   beam.particles().positions.row(0) *= 4;
