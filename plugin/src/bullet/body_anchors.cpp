@@ -15,6 +15,17 @@ namespace penalty {
 
 bool has_anchors(const btSoftBody& body) { return body.m_anchors.size() > 0 || body.m_deformableAnchors.size() > 0; }
 
+std::vector<btCollisionObject*> held_together(btSoftBody& body, const WorldObjects& objects) {
+  std::vector<btCollisionObject*> together{&body};
+  const auto add = [&](const btCollisionObject* object) {
+    if (objects.contain(object) && (!object->isStaticObject() || object->isKinematicObject()))
+      together.push_back(const_cast<btCollisionObject*>(object));
+  };
+  for (int k = 0; k < body.m_anchors.size(); ++k) add(body.m_anchors[k].m_body);
+  for (int k = 0; k < body.m_deformableAnchors.size(); ++k) add(body.m_deformableAnchors[k].m_cti.m_colObj);
+  return together;
+}
+
 const char* read_anchors(HeldBody& held, const WorldObjects& objects) {
   const btSoftBody& body = *held.body;
   held.anchors.clear();
@@ -55,7 +66,7 @@ bool is_anchored(const HeldBody& held, const btCollisionObject& object) {
 
 void add_anchors(const HeldBody& held, const RigidBodies& rigid_bodies, WorldIsland& island) {
   for (const HeldAnchor& anchor : held.anchors) {
-    const int touched = rigid_bodies.touch(*anchor.object, true, island.touched);
+    const int touched = rigid_bodies.touch(*anchor.object, false, island.touched);
     island.anchors.push_back({.a = Side::of_particles(0, WeightedPoint::at_particle(anchor.node)),
                               .b = Side::of_rigid(touched, anchor.local),
                               .influence = anchor.influence});

@@ -7,11 +7,13 @@
 #include <cmath>
 #include <vector>
 
+#include "body_anchors.h"
 #include "convert.h"
 #include "couplings.h"
 #include "held_bodies.h"
 #include "obstacles.h"
 #include "world_island.h"
+#include "world_objects.h"
 
 namespace penalty {
 namespace {
@@ -59,19 +61,24 @@ void wake_if_hit(btSoftBody& body) {
   }
 }
 
-void wait_for_carried(btSoftBody& body, const WorldIsland& island) {
+void wait_for_carried(const HeldBody& held, const WorldIsland& island) {
   for (const TouchedRigidBody& touched : island.touched)
-    if (touched.start.is_dynamic() && touched.body->getActivationState() != WANTS_DEACTIVATION)
-      body.setDeactivationTime(0);
+    if (touched.start.is_dynamic() && touched.body->getActivationState() != WANTS_DEACTIVATION &&
+        !is_anchored(held, *touched.body))
+      held.body->setDeactivationTime(0);
 }
 
-void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies) {
+void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies,
+                         std::span<btSoftBody* const> listed) {
   std::vector<std::vector<btCollisionObject*>> groups;
   for (const auto& coupling : couplings.all()) {
     if (!coupling->is_complete) continue;
     groups.emplace_back();
     for (const HeldPoint& point : coupling->points) groups.back().push_back(point.object());
   }
+  for (btSoftBody* body : listed)
+    if (has_anchors(*body) && bodies.find(*body))
+      groups.push_back(held_together(*body, WorldObjects(body->getWorldInfo()->m_broadphase)));
   for (const auto& [a, b] : surfaces.neighbours()) {
     const HeldBody *one = bodies.find(a), *two = bodies.find(b);
     const bool has_one = one && bodies.is_listed(*one), has_two = two && bodies.is_listed(*two);

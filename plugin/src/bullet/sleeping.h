@@ -24,11 +24,14 @@ void update_activation(HeldBody& held, Real duration);
 /// A sleeping soft body wakes when something that moves comes near.
 void wake_if_hit(btSoftBody& body);
 
-/// A soft body sleeps only after what it carries, which in turn waits, as one island of Bullet's, for the soft body.
-void wait_for_carried(btSoftBody& body, const WorldIsland& island);
+/// A soft body sleeps only after what it carries, which in turn waits, as one island of Bullet's, for the soft body. What
+/// is anchored to it, it sleeps with: see below.
+void wait_for_carried(const HeldBody& held, const WorldIsland& island);
 
-/// Bodies that are coupled, or might have touched, sleep together or not at all: while one is restless, those that want
-/// to sleep stay awake, and keep the time that they have been at rest, so that all fall asleep when the last of them may.
-void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies);
+/// Bodies that are coupled or anchored, or might have touched, sleep together or not at all: while one is restless, those
+/// that want to sleep stay awake, and keep the time that they have been at rest, so that all fall asleep when the last of
+/// them may. `listed`: all soft bodies of the world.
+void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies,
+                         std::span<btSoftBody* const> listed);
 
 }  // namespace penalty

@@ -101,7 +101,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
     }
   Surfaces::wake_touched(*bodies, listed, duration);
   couplings.find_bodies(*bodies, listed);
-  keep_awake_together(couplings, surfaces_, *bodies);
+  keep_awake_together(couplings, surfaces_, *bodies, listed);
   couplings.hold_bodies_of_incomplete();
   for (btSoftBody* body : listed) {
     HeldBody* held = bodies->find(*body);
@@ -144,7 +144,7 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   island.held.push_back(&held);
   held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);
   add_anchors(held, rigid_bodies_, island);
-  wait_for_carried(body, island);
+  wait_for_carried(held, island);
   islands_.push_back(std::move(island));
 }
 
