@@ -26,6 +26,7 @@ const std::vector<Sequence::Operation>& Sequence::operations() {
                                           {"couple", 3, &Sequence::couple, true},
                                           {"uncouple", 1, &Sequence::uncouple, true},
                                           {"edit coupling", 1, &Sequence::edit_coupling, true},
+                                          {"change anchors", 3, &Sequence::change_anchors, true},
                                           {"add rigid body", 2, &Sequence::add_rigid_body, false},
                                           {"remove rigid body", 1, &Sequence::remove_rigid_body, false},
                                           {"change rigid body", 1, &Sequence::change_rigid_body, true},
@@ -51,8 +52,7 @@ Sequence::~Sequence() = default;
 void Sequence::run() {
   const int manner = chance_.index(4);
   chance_.manner = manner < 2 ? Manner::legal : manner == 2 ? Manner::extreme : Manner::misuse;
-  const int worlds = chance_.one_in(6) ? 2 : 1;
-  for (int i = 0; i < worlds; ++i) {
+  for (int left = chance_.one_in(6) ? 2 : 1; left > 0; --left) {
     const WorldKind kind = chance_.one_in(2) ? WorldKind::classic : WorldKind::deformable;
     worlds_.push_back(std::make_unique<Simulation>(kind));
     worlds_.back()->set_gravity(chance_.one_in(3) ? Vector3(0, 0, 0) : Vector3(0, -9.81, 0));

@@ -81,6 +81,7 @@ class Sequence {
   void couple();
   void uncouple();
   void edit_coupling();
+  void change_anchors();
   void add_rigid_body();
   void remove_rigid_body();
   void change_rigid_body();

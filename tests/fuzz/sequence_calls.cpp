@@ -79,6 +79,34 @@ void Sequence::edit_coupling() {
   attempt("edit_coupling", [&] { change_elements(chance_, joint.home->penalty().edit_coupling(joint.number)); });
 }
 
+// An anchor more, or fewer.
+void Sequence::change_anchors() {
+  Body* body = pick_body();
+  if (!body) return;
+  btSoftBody& soft = *body->soft;
+  const int node = chance_.index(soft.m_nodes.size());
+  const int manner = chance_.index(8);
+  say("  manner " + std::to_string(manner) + ", node " + std::to_string(node));
+  if (manner == 0) return soft.m_anchors.clear();
+  if (manner == 1) return soft.m_deformableAnchors.clear();
+  if (manner == 2) return soft.removeAnchor(node);
+  if (rigid_.empty()) return;
+  RigidObject& rigid = chance_.pick(rigid_);
+  if (legal() && rigid.home != body->home) return;
+  if (!legal()) body->ordinary = false;
+  if (manner < 5) {  // Bullet's table of distances has no cells for what is nowhere
+    if (soft.m_nodes[node].m_x.length2() < 1e6 && rigid.body->getWorldTransform().getOrigin().length2() < 1e6)
+      soft.appendDeformableAnchor(node, rigid.body);
+    return;
+  }
+  const bool apart = chance_.one_in(2);
+  const btScalar influence = scalar(chance_.one_in(2) ? 1 : chance_.number(0, 1));
+  if (manner == 5)
+    soft.appendAnchor(node, rigid.body, vector(chance_.number(-1, 1), chance_.number(-1, 1), 0), apart, influence);
+  else
+    soft.appendAnchor(node, rigid.body, apart, influence);
+}
+
 void Sequence::add_rigid_body() {
   if (rigid_.size() > 5) return;
   Simulation& home = *chance_.pick(worlds_);
@@ -122,6 +150,15 @@ void Sequence::remove_rigid_body() {
       if (holds) joint.home->penalty().uncouple(joint.number);
       return holds;
     });
+  // Anchors may stay: who is held by nothing is held where it is, until they are removed.
+  if (chance_.one_in(2))
+    for (const auto& body : bodies_) {
+      btSoftBody& soft = *body->soft;
+      for (int k = soft.m_anchors.size() - 1; k >= 0; --k)
+        if (soft.m_anchors[k].m_body == gone.body) soft.m_anchors.removeAtIndex(k);
+      for (int k = soft.m_deformableAnchors.size() - 1; k >= 0; --k)
+        if (soft.m_deformableAnchors[k].m_cti.m_colObj == gone.body) soft.m_deformableAnchors.removeAtIndex(k);
+    }
   gone.home->remove(*gone.body);
   rigid_.erase(rigid_.begin() + number);
 }

@@ -45,6 +45,7 @@ bool Sequence::keeps_books(const Simulation& home) const {
   for (const auto& body : bodies_) {
     if (body->home != &home || !body->attached || !body->in_world()) continue;
     if (!body->conserves || body->stopped || body->tangled) return false;
+    if (body->soft->m_anchors.size() + body->soft->m_deformableAnchors.size() > 0) return false;  // of what is gone
     for (int i = 0; i < body->soft->m_nodes.size(); ++i)
       if (!(body->soft->m_nodes[i].m_im > 0)) return false;
   }
@@ -149,6 +150,8 @@ void Sequence::mend() {
   rigid_.clear();
   for (const auto& body : bodies_) {
     btSoftBody& soft = *body->soft;
+    soft.m_anchors.clear();
+    soft.m_deformableAnchors.clear();
     soft.getCollisionShape()->setMargin(btScalar(0.02));
     // All lie in one place now, and would meet.
     soft.setCollisionFlags(soft.getCollisionFlags() | btCollisionObject::CF_NO_CONTACT_RESPONSE);
