@@ -137,6 +137,18 @@ struct Scene::Impl {
     }
   }
 
+  // To where they will be at the present time, when the step ends.
+  void carry_pinned() {
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const SoftObject& object = setup.bodies[b];
+      if (object.carrier < 0) continue;
+      const auto& path = setup.objects[static_cast<std::size_t>(object.carrier)].path;
+      const Pose from = path(0), to = path(time);
+      for (const int i : object.pinned)
+        bodies[b]->m_nodes[i].m_x = to_bullet(Vector3(to.position + to.rotation * from.local(object.positions.col(i))));
+    }
+  }
+
   const AttachedBodies& attached() const { return const_cast<BulletWorld&>(world).attached(); }
   const Particles& particles(std::size_t body) const { return attached().particles(*bodies[body]); }
 };
@@ -154,6 +166,7 @@ void Scene::step(Real duration) {
   }
   scene.restart_if_due(duration);
   scene.time += duration;
+  scene.carry_pinned();
   for (std::size_t b = 0; b < scene.setup.objects.size(); ++b)
     if (const auto& path = scene.setup.objects[b].path)
       scene.rigid_bodies[b]->setWorldTransform(to_bullet(path(scene.time)));  // Bullet makes a velocity of the way

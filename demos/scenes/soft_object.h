@@ -14,6 +14,7 @@ struct SoftObject {
   Eigen::Matrix3Xd positions = {};   // at the start, 3 x vertices [m]
   Eigen::Matrix3Xd velocities = {};  // at the start [m/s]; empty: it is at rest
   std::vector<int> pinned = {};      // vertices that nothing moves
+  int carrier = -1;                  // but this object of the scene, which has a path; -1: none
   std::vector<int> tip = {};         // vertices whose mean drop is followed
   Real friction = 0.7;               // Coulomb coefficient, multiplied with that of what it touches
   /// Called before each world step with the time at its start [s]: what changes about the elements in the course of the

@@ -91,5 +91,14 @@ TEST_P(ContactClaims, FingersLiftTheBallWithoutSlip) {
   EXPECT_LT(fact(*scene, "slip_mean"), 0.02);
 }
 
+TEST_P(ContactClaims, TheCapeStreamsBehindItsWearerAndIsNotStretched) {
+  const auto scene = make("cape", {.cells = 10});
+  run(*scene, 1.8);
+  EXPECT_GT(fact(*scene, "furthest_behind"), 0.4);
+  run(*scene, 2.4);
+  EXPECT_LT(fact(*scene, "longest_edge"), 1.2);
+  EXPECT_EQ(scene->penetration(), 0);
+}
+
 }  // namespace
 }  // namespace penalty::demo
