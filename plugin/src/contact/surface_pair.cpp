@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace penalty {
 namespace {
@@ -263,7 +264,7 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
     c.near.push_back(q);
     for (const FeaturePair& old : pressed_)
       if (old.points == q.points && old.are_edges == q.are_edges && old.from_b == q.from_b)
-        c.near.back().memory = old.memory;
+        std::tie(c.near.back().memory, c.near.back().record) = std::tie(old.memory, old.record);
   }
   c.path = patch_a(c).path + patch_b(c).path;
   c.shift = patch_b(c).shift - patch_a(c).shift;

@@ -33,7 +33,7 @@ void SurfaceContacts::guard(Real h, Real remaining, const RigidSweep& rigid_swee
     if (scratch_.failing.empty()) return;
     if (round < extra_sweeps) {
       if (!collected) {
-        book_recovery();
+        book();
         collect(h);
       }
       collected = true;
@@ -178,7 +178,7 @@ void SurfaceContacts::freeze(Real h) {
     std::vector<FailingPair> again;
     for (const int zone : touched) {
       std::sort(members[zone].begin(), members[zone].end());
-      make_rigid(members[zone]);
+      join(members[zone], pairs_of);
       for (const int particle : members[zone])
         again.insert(again.end(), pairs_of[particle].begin(), pairs_of[particle].end());
     }
@@ -200,6 +200,48 @@ struct SurfaceContacts::RigidMotion {
 RigidBody* SurfaceContacts::rigid_body(int number) const {
   const int first = first_particle_.back();
   return number < first ? nullptr : &island_.rigid_bodies[number - first];
+}
+
+// Makes a zone rigid. If it is of two bodies, what that gives is recorded at a pair that joins them; of more it is not
+// known who gave what to whom.
+void SurfaceContacts::join(std::span<const int> numbers, std::span<const std::vector<FailingPair>> pairs_of) {
+  const FailingPair* link = nullptr;
+  for (const int number : numbers)
+    for (const FailingPair& pair : pairs_of[number])
+      if (!link && !pair.contact->is_within_body() && is_in_one_zone(pair)) link = &pair;
+  bool takes_all = true, a_is_held = false;
+  for (const int number : numbers) {
+    if (!link) break;
+    const SurfaceContact& contact = *link->contact;
+    if (const RigidBody* rigid = rigid_body(number)) {
+      takes_all = takes_all && contact.rigid >= 0 && rigid == &island_.rigid_bodies[contact.rigid];
+      continue;
+    }
+    const auto [body, i] = particle(number);
+    const bool is_of_a = body == island_.bodies[contact.body_a];
+    takes_all = takes_all && (is_of_a || (contact.rigid < 0 && body == island_.bodies[contact.body_b]));
+    a_is_held = a_is_held || (is_of_a && !(body->particles.inverse_masses[i] > 0));
+  }
+  if (!link || !takes_all) return make_rigid(numbers);
+  // Who is held does not say what it was given.
+  const SurfaceContact& contact = *link->contact;
+  const auto momentum = [&]() -> Vector3 {
+    if (a_is_held && contact.rigid >= 0) return island_.rigid_bodies[contact.rigid].impulse;
+    Vector3 sum = Vector3::Zero();
+    for (const int number : numbers) {
+      if (rigid_body(number)) continue;
+      const auto [body, i] = particle(number);
+      if (const Real inverse_mass = body->particles.inverse_masses[i];
+          body == island_.bodies[a_is_held ? contact.body_b : contact.body_a] && inverse_mass > 0)
+        sum += body->particles.velocities.col(i).head<3>() / inverse_mass;
+    }
+    return sum;
+  };
+  const Vector3 before = momentum();
+  make_rigid(numbers);
+  const FeaturePair& q = *link->features;
+  const Vector3 given = (momentum() - before) * (a_is_held != q.from_b ? -1 : 1);  // to the first feature
+  record(features_of(contact, q, false), q.thickness, given);
 }
 
 // What is held holds the rest, and does the work.

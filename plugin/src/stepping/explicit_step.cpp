@@ -286,26 +286,12 @@ Real contact_noise_rate(const Island& island, Real duration) {
 
 void undo(Island& island, SurfaceContacts& surfaces) {
   island.rigid_bodies = island.rigid_start;
-  for (Contact& contact : island.contacts) contact.depth = 0;
   for (SteppedBody* body : island.bodies) undo_step(*body);
   for (Coupling* coupling : island.couplings) {
     coupling->field->set_state(coupling->start_state);
     evaluate_forces(*coupling, island);
   }
   if (!surfaces.is_empty()) surfaces.undo();
-}
-
-void report_contacts(const Island& island) {
-  const auto book = [&](const Side& side, const Contact& contact) {
-    if (side.is_rigid()) return;
-    StepReport& report = island.bodies[side.body]->report;
-    ++report.num_contacts;
-    report.contact_depth = std::max(report.contact_depth, contact.depth);
-  };
-  for (const Contact& contact : island.contacts) {
-    book(contact.a, contact);
-    book(contact.b, contact);
-  }
 }
 
 int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
@@ -380,9 +366,10 @@ void advance_explicitly(Island& island, Real duration) {
     if (step.finite) body->last_substeps = step.attempt.substeps;
     body->implicit.has_acceleration = false;
   }
-  report_contacts(island);
+  report_particle_contacts(island);
   surfaces.report();
   if (!step.finite) {
+    island.records.clear();
     name_bad_particles(island.bodies);
     undo(island, surfaces);
     for (SteppedBody* body : island.bodies) body->step_flows = {};

@@ -54,6 +54,7 @@ StepReport report_of(const Island& island) {
 }  // namespace
 
 StepReport advance(Island& island, Real duration) {
+  island.records.clear();
   if (island.bodies.empty() || !(duration > 0) || !std::isfinite(duration)) return {};
   if (steps_implicitly(island, duration))
     advance_implicitly(*island.bodies.front(), duration);

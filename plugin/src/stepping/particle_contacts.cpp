@@ -26,6 +26,23 @@ Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Part
   return work;
 }
 
+ContactPlace place_of(const Contact& contact, const Island& island) {
+  ContactPlace place{.at = contact.a.point.of(island.bodies[contact.a.body]->particles.positions),
+                     .offset = {},
+                     .normal = contact.normal,
+                     .gap = 0};
+  if (contact.b.is_rigid()) {
+    const RigidBody& rigid = island.rigid_bodies[contact.b.rigid];
+    place.offset = place.at - rigid.position - rigid.rotation * contact.b.anchor;
+    place.normal = rigid.rotation * contact.normal;
+  } else {
+    place.offset = place.at - contact.b.point.of(island.bodies[contact.b.body]->particles.positions);
+  }
+  if (contact.radius > 0 && !place.offset.isZero(0)) place.normal = place.offset.normalized();
+  place.gap = place.normal.dot(place.offset) - contact.radius;
+  return place;
+}
+
 Vector3 ParticleContactRow::velocity_of_other() const {
   return rigid ? rigid->velocity_at(arm) : contact->b.point.of(other->particles.velocities);
 }
@@ -52,30 +69,23 @@ void ParticleContacts::begin(Real h, Real since) {
     row.body = island_.bodies[contact.a.body];
     const Particles& particles = row.body->particles;
     const WeightedPoint& point = contact.a.point;
-    const Vector3 x = point.of(particles.positions);
-    Vector3 offset;
+    const auto [at, offset, normal, gap] = place_of(contact, island_);
+    row.normal = normal;
     if (contact.b.is_rigid()) {
       row.rigid = &island_.rigid_bodies[contact.b.rigid];
-      row.arm = x - row.rigid->position;
-      row.normal = row.rigid->rotation * contact.normal;
+      row.arm = at - row.rigid->position;
       row.is_obstacle = !row.rigid->is_dynamic();
       if (!row.is_obstacle) row.other_mobility = row.rigid->mobility_at(row.arm);
-      offset = row.arm - row.rigid->rotation * contact.b.anchor;
     } else {
       row.other = island_.bodies[contact.b.body];
-      row.normal = contact.normal;
       const Real mobility = contact.b.point.mobility(row.other->particles.inverse_masses);
       row.is_obstacle = mobility <= 0;
       row.other_mobility.diagonal().setConstant(mobility);
-      offset = x - contact.b.point.of(row.other->particles.positions);
     }
     row.point_mobility = point.mobility(particles.inverse_masses);
     if (row.is_held() && row.is_obstacle) continue;
     has_held_ = has_held_ || row.is_held();
     row.is_driven = has_held_particle(point, particles);
-    if (contact.radius > 0 && !offset.isZero(0)) row.normal = offset.normalized();
-    const Real gap = row.normal.dot(offset) - contact.radius;
-    contact.depth = std::max(contact.depth, -gap);
     if (-gap <= contact.deepest)
       row.recovery =
           std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
@@ -111,7 +121,10 @@ void ParticleContacts::start(Real since) {
 
 void ParticleContacts::begin_attempt() {
   outside_work_ = 0;
-  for (Contact& contact : island_.contacts) contact.memory = {};
+  for (Contact& contact : island_.contacts) {
+    contact.memory = {};
+    contact.given = {};
+  }
 }
 
 // The nearest that presses, and rubs no more than it may.
@@ -201,9 +214,13 @@ Real ParticleContacts::settle_held() {
 void ParticleContacts::end(Real since) {
   for (const Row& row : rows_) {
     if (starts_warm_) row.contact->memory.keep(row.impulse, row.normal, since);
-    if (row.wanted < 0 || row.impulse.isZero(0)) continue;  // what was open, or pushed nothing
+    if (row.impulse.isZero(0)) continue;
+    const Real along = row.normal.dot(row.impulse);
+    const Vector3 across = row.impulse - along * row.normal;
+    row.contact->given.add(row.normal, along, across, is_at_limit(across.norm(), row.contact->friction * along));
+    if (row.wanted < 0) continue;  // what was open
     const Real excess = row.normal.dot(relative_velocity(row)) - row.wanted;
-    if (excess > 0) outside_work_ += excess * row.normal.dot(row.impulse);
+    if (excess > 0) outside_work_ += excess * along;
   }
 }
 

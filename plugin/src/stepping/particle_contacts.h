@@ -12,6 +12,17 @@ inline constexpr Real recovery_acceleration = 100;
 /// What an impulse on the point gives to whoever drives the particles of it that are held [J].
 Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles);
 
+/// Where a contact is.
+struct ContactPlace {
+  Vector3 at, offset, normal;  // the point of a, the way to it from that of b, and that from b to a
+  Real gap;                    // negative: depth [m]
+};
+ContactPlace place_of(const Contact& contact, const Island& island);
+
+/// Adds contacts of particles, as they are now, to the reports of the bodies, and what they gave to the records of the
+/// island.
+void report_particle_contacts(Island& island);
+
 /// A contact in one drift.
 struct ParticleContactRow {
   Contact* contact = nullptr;

@@ -30,7 +30,6 @@ SurfaceContacts::SurfaceContacts(Island& island)
   if (is_empty()) return;
   surfaces_.assign(island.bodies.size(), nullptr);
   may_touch_.assign(island.bodies.size(), false);
-  lost_thickness_.assign(island.bodies.size(), 0);
   for (const SurfaceContact& contact : island.surfaces) {
     surfaces_[contact.body_a] = &contact.pair->a();
     if (contact.rigid < 0) {
@@ -60,6 +59,7 @@ void SurfaceContacts::take_velocities() {
 
 void SurfaceContacts::begin_step(Real duration) {
   if (is_empty()) return;
+  scratch_.records.clear();
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     if (surfaces_[k]) surfaces_[k]->begin_step(island_.bodies[k]->particles.positions);
   for (const auto& [surface, body] : rigid_surfaces_) surface->begin_step(body->position, body->rotation);
@@ -106,7 +106,7 @@ void SurfaceContacts::sweep(Real h, Real remaining, Real since, const RigidSweep
   collect(h);
   if (converge(h, since, rigid_sweep)) take_velocities();
   guard(h, remaining, rigid_sweep);
-  book_recovery();
+  book();
 }
 
 void SurfaceContacts::close(Real h, Real since, const RigidSweep& rigid_sweep) {
@@ -114,7 +114,7 @@ void SurfaceContacts::close(Real h, Real since, const RigidSweep& rigid_sweep) {
   refresh(h, h);
   collect(h);
   converge(h, since, rigid_sweep);
-  book_recovery();
+  book();
 }
 
 void SurfaceContacts::drifted(Real h) {
@@ -126,7 +126,7 @@ void SurfaceContacts::drifted(Real h) {
 
 void SurfaceContacts::undo() {
   outside_work_ = 0;
-  std::fill(lost_thickness_.begin(), lost_thickness_.end(), 0);
+  scratch_.records.clear();
   for (ContactSurface* surface : surfaces_)
     if (surface) surface->forget();
   for (const auto& [surface, body] : rigid_surfaces_) surface->forget();
@@ -142,7 +142,7 @@ void SurfaceContacts::collect(Real h) {
       const ClosestPoints closest = contact.pair->closest(q);
       if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
       const Real limit = q.thickness + reach;
-      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory);
+      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory, &q.record);
     });
     const bool is_held = std::find(held_inside_.begin(), held_inside_.end(), contact.pair) != held_inside_.end();
     if (!contact.pair->enclosed().empty() && !is_held) lead_out(contact);
@@ -159,7 +159,7 @@ void SurfaceContacts::collect(Real h) {
 }
 
 void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest,
-                          const Vector3* leads_out, ContactMemory* memory) {
+                          const Vector3* leads_out, ContactMemory* memory, int* kept_record) {
   const SurfacePair& surfaces = *contact.pair;
   const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
   TouchingPair pair{.begin = scratch_.particles.size(),
@@ -167,6 +167,8 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
                     .thickness = q.thickness - surfaces.b().radius(),
                     .friction = surfaces.friction(),
                     .memory = memory,
+                    .features = features_of(contact, q, !memory),
+                    .kept_record = kept_record,
                     .leads_out = leads_out != nullptr,
                     .body_a = contact.body_a,
                     .body_b = contact.rigid < 0 ? contact.body_b : contact.body_a};
@@ -192,6 +194,7 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
     if (surface.is_rigid()) continue;
     add_particles(surface.points()[q.points[k]], closest.weights[k], is_of_first ? of_first : of_second, pair.begin);
     at += std::abs(closest.weights[k]) * surface.position(q.points[k]);
+    if (is_of_first) pair.of_first = scratch_.particles.size() - pair.begin;
   }
   pair.end = scratch_.particles.size();
   if (contact.rigid >= 0) {
@@ -204,20 +207,8 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
     scratch_.particles.resize(pair.begin);
     return;
   }
+  pair.record = known_record(pair.features, *kept_record);
   scratch_.pairs.push_back(pair);
-  for (const int body : {pair.body_a, pair.body_b}) lost_thickness_[body] = std::max(lost_thickness_[body], -pair.gap);
-}
-
-void SurfaceContacts::report() const {
-  for (std::size_t k = 0; k < lost_thickness_.size(); ++k) {
-    StepReport& report = island_.bodies[k]->report;
-    report.contact_depth = std::max(report.contact_depth, lost_thickness_[k]);
-  }
-  if (is_empty()) return;
-  for (const TouchingPair& pair : scratch_.pairs) {
-    ++island_.bodies[pair.body_a]->report.num_contacts;
-    if (pair.body_b != pair.body_a) ++island_.bodies[pair.body_b]->report.num_contacts;
-  }
 }
 
 // Points of an embedded surface may share particles.
@@ -245,11 +236,12 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
     FeaturePair features;
     ClosestPoints closest;
     bool is_inside;
+    int* record;
   };
   std::vector<Way> ways;
   Vector3 direction = Vector3::Zero();  // of a against b
   Real depths = 0;
-  for (const EnclosedPoint& enclosed : pair.enclosed()) {
+  for (EnclosedPoint& enclosed : pair.enclosed()) {
     ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
     const ContactSurface::Nearest nearest =
         around.nearest((enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point));
@@ -263,7 +255,8 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
                      .from_b = enclosed.of_b,
                      .thickness = pair.kept_distance()},
                     nearest.closest,
-                    inwards.dot(outwards) < 0});
+                    inwards.dot(outwards) < 0,
+                    &enclosed.record});
     if (!ways.back().is_inside) continue;
     direction += enclosed.of_b ? inwards : Vector3(-inwards);
     depths += inwards.norm();
@@ -274,9 +267,9 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
   for (const Way& way : ways)
     if (way.is_inside) {
       const Vector3 out = way.features.from_b ? Vector3(-direction) : direction;
-      add(contact, way.features, way.closest, &out, nullptr);
+      add(contact, way.features, way.closest, &out, nullptr, way.record);
     } else {
-      add(contact, way.features, way.closest, nullptr, nullptr);
+      add(contact, way.features, way.closest, nullptr, nullptr, way.record);
     }
 }
 
@@ -296,7 +289,11 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
   }
   for (int sweep = 0; rigid_sweep() && sweep < most_sweeps; ++sweep) {
   }
-  for (const TouchingPair& pair : scratch_.pairs) {
+  for (TouchingPair& pair : scratch_.pairs) {
+    if (pair.given > 0 && pair.record < 0) {
+      open_record(pair);
+      *pair.kept_record = pair.record;
+    }
     if (pair.memory)
       pair.memory->keep(pair.given * pair.axes.col(0) + pair.axes.rightCols<2>() * pair.rubbed, pair.axes.col(0),
                         since);

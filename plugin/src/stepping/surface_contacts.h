@@ -2,15 +2,37 @@
 #pragma once
 #include <functional>
 #include <optional>
+#include <tuple>
 
 #include "penalty/contact/surface_pair.h"
 #include "penalty/stepping/island.h"
 
 namespace penalty {
 
+/// A pair of features of the island's surfaces, or a point that is inside one of them and the triangle that is nearest.
+struct TouchingFeatures {
+  int contact = 0;  // number among the surfaces of the island
+  std::array<int, 4> points = {};
+  bool are_edges = false, from_b = false, is_enclosed = false;
+
+  auto key() const {
+    return std::tuple(contact, is_enclosed, from_b, are_edges, points[0], is_enclosed ? 0 : points[1],
+                      is_enclosed ? 0 : points[2], is_enclosed ? 0 : points[3]);
+  }
+  bool are(const TouchingFeatures& other) const { return key() == other.key(); }
+};
+
+/// What features gave in a step, on the first.
+struct TouchingRecord {
+  TouchingFeatures features;
+  Real thickness = 0;  // the radius of a rigid surface included [m]
+  ContactImpulse given = {};
+};
+
 /// Where two features touch, or may in the coming drift: a row of constraints along the normal and two across it.
 struct TouchingPair {
-  std::size_t begin = 0, end = 0;        // of its particles
+  std::size_t begin = 0, end = 0;        // of its particles,
+  std::size_t of_first = 0;              // and how many of these are of the first feature
   Matrix3 axes = Matrix3::Zero();        // the normal, from the second feature to the first, and two tangents
   Vector3 difference = Vector3::Zero();  // the way between these points [m]
   Real gap = 0, thickness = 0;           // distance beyond the thickness; negative where some of that is lost [m]
@@ -22,6 +44,9 @@ struct TouchingPair {
   Eigen::Matrix2<Real> inertia = Eigen::Matrix2<Real>::Zero();  // along these [kg]; zero: no friction
   bool has_friction_rows = false;                               // they are made when they are first needed
   ContactMemory* memory = nullptr;                              // null: starts from nothing
+  TouchingFeatures features = {};
+  int record = -1;                // of them; -1: none yet, and its number is to be kept
+  int* kept_record = nullptr;     // here
   bool leads_out = false;         // out of a closed surface that the first feature, a point, is inside of
   int body_a = 0, body_b = 0;     // half of what is lost is booked to each
   RigidBody* rigid = nullptr;     // one of the features is fixed in it, and takes
@@ -52,6 +77,7 @@ struct SurfaceScratch {
   std::vector<TouchingPair> pairs;
   std::vector<TouchingParticle> particles;
   std::vector<FailingPair> failing;
+  std::vector<TouchingRecord> records;  // of the attempt at the step
 };
 
 /// Each pair of features that may touch in a drift of h is a one-sided constraint on velocities along the direction n
@@ -106,8 +132,9 @@ class SurfaceContacts {
   /// The particles were put back to where the step began; the work is forgotten.
   void undo();
 
-  /// Adds to the reports of the bodies: what touched at the end, and the most of a thickness that was lost.
-  void report() const;
+  /// Adds what touches at the end, and how deep, to the reports of the bodies, and what it gave to the records of the
+  /// island.
+  void report();
 
   /// Of giving thickness back, leading out, and of whoever drives what is held [J].
   Real outside_work() const { return outside_work_; }
@@ -122,7 +149,7 @@ class SurfaceContacts {
   bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
   void collect(Real h);
   void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out,
-           ContactMemory* memory);
+           ContactMemory* memory, int* kept_record);
   void add_particles(const WeightedPoint& point, Real weight, int body, std::size_t begin);
   void lead_out(const SurfaceContact& contact);
   void hold_inside(const SurfaceContact& surface);
@@ -141,8 +168,16 @@ class SurfaceContacts {
   bool recall(TouchingPair& pair, Real since);
   void rub(TouchingPair& pair);
   void rub(TouchingPair& pair, Eigen::Vector2<Real> rubbed, const Eigen::Vector2<Real>& slip);
-  void book_recovery();
+  void book();
   void book_loss(const TouchingPair& pair, Real loss);
+  int known_record(const TouchingFeatures& features, int number) const;
+  void open_record(TouchingPair& pair);
+  void record(TouchingPair& pair);
+  void record(const TouchingFeatures& features, Real thickness, const Vector3& given);
+  TouchingFeatures features_of(const SurfaceContact& contact, const FeaturePair& q, bool is_enclosed) const;
+  void merge_records();
+  void report(const TouchingRecord& touching);
+  void report_enclosed(const SurfaceContact& contact);
   std::span<TouchingParticle> particles_of(const TouchingPair& pair) const {
     return std::span(scratch_.particles).subspan(pair.begin, pair.end - pair.begin);
   }
@@ -153,6 +188,7 @@ class SurfaceContacts {
   void find_failing(Real h);
   bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;
   void freeze(Real h);
+  void join(std::span<const int> numbers, std::span<const std::vector<FailingPair>> pairs_of);
   void make_rigid(std::span<const int> numbers);
   std::optional<RigidMotion> motion_of_held(std::span<const int> numbers) const;
   RigidMotion common_motion(std::span<const int> numbers) const;
@@ -168,10 +204,9 @@ class SurfaceContacts {
   SurfaceScratch& scratch_;
   std::vector<ContactSurface*> surfaces_;  // of the island's bodies, null: none
   std::vector<std::pair<ContactSurface*, RigidBody*>> rigid_surfaces_;
-  std::vector<int> first_particle_;   // of each body, and their number: particles numbered through, then rigid bodies
-  std::vector<int> zone_;             // of particles that move as one: another of these; empty: none do
-  std::vector<char> may_touch_;       // each body
-  std::vector<Real> lost_thickness_;  // of each body, the most in this step [m]
+  std::vector<int> first_particle_;  // of each body, and their number: particles numbered through, then rigid bodies
+  std::vector<int> zone_;            // of particles that move as one: another of these; empty: none do
+  std::vector<char> may_touch_;      // each body
   std::vector<const SurfacePair*> held_inside_;  // what is too deep to be led out
   int least_substeps_ = 1;
   long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step

@@ -142,9 +142,11 @@ void SurfaceContacts::press(TouchingPair& pair, Real given, Real speed) {
 }
 
 // Lost thickness that comes back does work, as a surface that moves so fast.
-void SurfaceContacts::book_recovery() {
-  for (const TouchingPair& pair : scratch_.pairs) {
-    if (pair.gap > 0 || pair.given == 0) continue;
+void SurfaceContacts::book() {
+  for (TouchingPair& pair : scratch_.pairs) {
+    if (pair.given == 0) continue;
+    record(pair);
+    if (pair.gap > 0) continue;
     const Real work = pair.given * std::max<Real>(speed_of(pair, 0), 0);
     outside_work_ += work;
     book_loss(pair, work);

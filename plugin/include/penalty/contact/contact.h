@@ -42,6 +42,35 @@ class ContactMemory {
   Real share_ = 0;                   // so that the start is no more than either of the last two gave along the normal
 };
 
+/// What a contact gave in a step.
+struct ContactImpulse {
+  Vector3 pressed = Vector3::Zero(), rubbed = Vector3::Zero();  // along the normals of the substeps, and across [N s]
+  Real pressing = 0, sliding = 0;  // sizes along the normal, of all and of those with friction at its limit [N s]
+
+  bool is_none() const { return !(pressing > 0); }
+  Vector3 sum() const { return pressed + rubbed; }
+
+  /// That of a substep.
+  void add(const Vector3& normal, Real along, const Vector3& across, bool is_at_limit) {
+    pressed += along * normal;
+    rubbed += across;
+    pressing += along;
+    if (is_at_limit) sliding += along;
+  }
+  void add(const ContactImpulse& other) {
+    pressed += other.pressed;
+    rubbed += other.rubbed;
+    pressing += other.pressing;
+    sliding += other.sliding;
+  }
+};
+
+/// Whether friction of this size is all that Coulomb's law allows.
+inline bool is_at_limit(Real size, Real most) {
+  constexpr Real round_off = 1e-6;
+  return size >= (1 - round_off) * most;
+}
+
 /// Which share of impulses to start from makes most of the approach go away: `before` and `after` are what they work
 /// against it, before and after all are given. A start is never worse than none, so sweeps that end early gain no energy.
 inline Real best_share(Real before, Real after) {
@@ -59,8 +88,8 @@ struct Contact {
   Real deepest =
       std::numeric_limits<Real>::infinity();  // depth that is taken back; what is deeper stays where it is [m]
 
-  Real depth = 0;  // largest depth during the step [m], reported
   ContactMemory memory = {};
+  ContactImpulse given = {};  // in the step, to a
 };
 
 /// The point of `a`, which belongs to particles, is held at that of `b`, which is fixed in a rigid body.

@@ -16,13 +16,15 @@ struct FeaturePair {
   Real thickness = 0;                  // distance that is kept, the radius of a rigid surface included [m]
   Real at_refresh = 0, at_search = 0;  // distance then [m]
   ContactMemory memory = {};           // of an impulse on the first
+  int record = -1;                     // number of what it gave in the step, if it is that of these features
 };
 
 /// A point of one surface that lies inside the other, which is closed.
 struct EnclosedPoint {
   int point;
   bool of_b;
-  Real depth;  // the radius of a rigid surface included [m]
+  Real depth;       // when the step began, the radius of a rigid surface included [m]
+  int record = -1;  // as of features
 };
 
 /// Pairs of features of two surfaces, found in three steps, each of which looks further ahead than the next and is
@@ -51,6 +53,7 @@ class SurfacePair {
   void begin_step();
   bool is_tangled() const { return is_tangled_; }
   std::span<const EnclosedPoint> enclosed() const { return enclosed_; }
+  std::span<EnclosedPoint> enclosed() { return enclosed_; }
 
   /// Largest speed at which patches that may meet within `duration` [s] come together [m/s].
   Real closing_speed(Real duration);

@@ -7,6 +7,7 @@
 #include "penalty/contact/contact.h"
 #include "penalty/fields/potential_field.h"
 #include "penalty/math/affine_span.h"
+#include "penalty/stepping/contact_record.h"
 #include "penalty/stepping/newton.h"
 #include "penalty/stepping/particles.h"
 #include "penalty/stepping/rigid_body.h"
@@ -93,6 +94,8 @@ struct Island {
   std::vector<Anchor> anchors = {};
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
+
+  std::vector<ContactRecord> records = {};  // what pressed in the last step; contacts between rigid bodies left out
 
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};

@@ -20,9 +20,12 @@ struct StepReport {
   int first_bad_particle = -1;  // when not finite: the first such particle at the start, else the fastest
   Real elastic_energy = 0;      // at the end [J]
   Real kinetic_energy = 0;      // at the end, without rigid bodies [J]
-  Real contact_depth = 0;       // largest depth below a contact plane, or of a thickness that was lost [m]
-  int num_contacts = 0;         // contacts that were considered
-  std::string problem = {};     // what is wrong, on one line; the body then stays where it is until it is mended
+  /// Largest depth at the end [m], of a node below a plane that is a margin outside a rigid body, of what surfaces have
+  /// lost of the distance that they keep, or of a point inside a closed surface, that distance included. Of edges that
+  /// pierce a surface, and of what has passed an open one, nothing is known.
+  Real contact_depth = 0;
+  int num_contacts = 0;      // contacts that were considered
+  std::string problem = {};  // what is wrong, on one line; the body then stays where it is until it is mended
 
   // What an implicit step set right after its minimum was found; the last substep's.
   Real restored_momentum = 0;  // given back to a free body [kg m/s]: what Newton iterations that end early took
