@@ -3,8 +3,10 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "body_settings.h"
+#include "convert.h"
 #include "face_tree.h"
 #include "penalty/math/text.h"
 #include "world_step.h"
@@ -17,6 +19,18 @@ constexpr Real least_weight = 1e-6;  // round-off of points on a face
 void check_points(const std::vector<WeightedPoint>& points, int num_particles, const char* which) {
   for (std::size_t k = 0; k < points.size(); ++k)
     points[k].check(num_particles, std::string("attach: ") + which + " point " + std::to_string(k));
+}
+
+Vector3 center_of_mass(const btCollisionObject& object) {
+  const btSoftBody* soft = btSoftBody::upcast(&object);
+  Vector3 sum = Vector3::Zero();
+  Real mass = 0;
+  for (int i = 0; soft && i < soft->m_nodes.size(); ++i)
+    if (const Real inverse_mass = soft->m_nodes[i].m_im; inverse_mass > 0) {
+      sum += to_vector(soft->m_nodes[i].m_x) / inverse_mass;
+      mass += 1 / inverse_mass;
+    }
+  return mass > 0 ? Vector3(sum / mass) : to_vector(object.getWorldTransform().getOrigin());
 }
 
 void check_surface(const BodySurface& surface, int num_particles) {
@@ -84,6 +98,19 @@ const Particles& AttachedBodies::particles(const btSoftBody& body) const {
 const PotentialField& AttachedBodies::field(const btSoftBody& body) const { return attached_->bodies->get(body).field; }
 const StepReport& AttachedBodies::report(const btSoftBody& body) const {
   return attached_->bodies->get(body).stepped.report;
+}
+std::span<const BodyContact> AttachedBodies::contacts(const btSoftBody& body) const {
+  return attached_->bodies->get(body).contacts->of(body);
+}
+ContactForce AttachedBodies::contact_force(const btCollisionObject& object) const {
+  ContactForce sum;
+  const Identity name{&object, serial_of(object)};
+  const Vector3 center = center_of_mass(object);
+  for (const HeldBody* held : attached_->bodies->all_listed()) held->contacts->add_force_on(name, center, sum);
+  return sum;
+}
+void AttachedBodies::set_contact_callback(ContactCallback callback) {
+  attached_->contact_callback = std::make_shared<const ContactCallback>(std::move(callback));
 }
 const EnergyFlows& AttachedBodies::flows(const btSoftBody& body) const {
   return attached_->bodies->get(body).stepped.flows;

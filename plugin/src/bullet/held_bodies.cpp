@@ -55,6 +55,7 @@ void HeldBody::hold(const char* problem, bool stopped) noexcept {
     report.kinetic_energy = kinetic_energy(stepped.particles);
   }
   stepped.positions_changed();
+  contacts->clear();
   body->setDeactivationTime(0);  // stays awake, to recover
 }
 
@@ -93,6 +94,14 @@ void HeldBodies::list(std::span<btSoftBody* const> bodies) {
     held.outcome = StepOutcome::none;
     held.start = held.stepped.particles.positions;
   }
+}
+
+std::vector<const HeldBody*> HeldBodies::all_listed() const {
+  std::vector<const HeldBody*> found;
+  for (const auto& [address, held] : bodies_)
+    if (is_listed(*held)) found.push_back(held.get());
+  std::ranges::sort(found, {}, &HeldBody::order);
+  return found;
 }
 
 bool HeldBodies::is_there(const Identity& name) const {

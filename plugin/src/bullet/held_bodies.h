@@ -4,7 +4,9 @@
 #include <span>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
+#include "body_contacts.h"
 #include "identity.h"
 #include "mesh_sides.h"
 #include "nodes.h"
@@ -45,7 +47,8 @@ struct HeldBody {
   std::shared_ptr<ContactSurface> surface;  // made when it is needed first,
   std::array<int, 2> surface_size{};        // of so many faces and links
   MeshSides mesh_sides;                     // of its points
-  int listed = 0;                           // step in which the world last had the body; 0: none so far
+  std::shared_ptr<BodyContacts> contacts = std::make_shared<BodyContacts>();  // who is told of them may detach the body
+  int listed = 0;  // step in which the world last had the body; 0: none so far
 
   // Of this step.
   StepOutcome outcome = StepOutcome::none;
@@ -89,6 +92,9 @@ class HeldBodies {
   void list(std::span<btSoftBody* const> bodies);
 
   bool is_listed(const HeldBody& held) const { return held.listed == step_; }
+
+  /// The bodies that were in the world in the last step, in the order in which they were attached. They may be deleted.
+  std::vector<const HeldBody*> all_listed() const;
 
   /// Whether the body is held, and in the world as of the last step or not yet there.
   bool is_there(const Identity& name) const;

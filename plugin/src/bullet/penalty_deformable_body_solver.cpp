@@ -114,6 +114,7 @@ void PenaltyDeformableBodySolver::applyTransforms(btScalar time_step) {
     body->interpolateRenderMesh();
   }
   attached_->correct_rigid_bodies(time_step);
+  attached_->tell_contacts();
 }
 
 void PenaltyDeformableBodySolver::processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) {

@@ -90,6 +90,12 @@ void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
   attached_->correct_rigid_bodies(time_step);
 }
 
+// The last that Bullet does in a step.
+void PenaltySoftBodySolver::updateSoftBodies() {
+  btDefaultSoftBodySolver::updateSoftBodies();
+  attached_->tell_contacts();
+}
+
 void PenaltySoftBodySolver::processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) {
   if (!is_attached(*body)) btDefaultSoftBodySolver::processCollision(body, object);
 }

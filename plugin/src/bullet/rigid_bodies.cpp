@@ -141,7 +141,7 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
       if (wake) touched[k].start = start_of(object);
       return static_cast<int>(k);
     }
-  touched.push_back({body, key, bounds_of(object), start_of(object), {}});
+  touched.push_back({&object, body, key, bounds_of(object), start_of(object), {}});
   return static_cast<int>(touched.size()) - 1;
 }
 

@@ -31,7 +31,8 @@ std::array<Vector3, 2> link_velocities(const btCollisionObject& object);
 
 /// An object that takes part in a step.
 struct TouchedRigidBody {
-  btRigidBody* body;  // null: an obstacle that is no rigid body
+  btCollisionObject* object;
+  btRigidBody* body;  // the same; null: an obstacle that is no rigid body
   int key;            // unique id of its broadphase proxy
   Box bounds;         // at the start
   RigidBody start, state;

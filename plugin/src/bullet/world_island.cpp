@@ -1,5 +1,7 @@
 #include "world_island.h"
 
+#include <BulletSoftBody/btSoftBody.h>
+
 #include <algorithm>
 
 #include "couplings.h"
@@ -82,6 +84,29 @@ void WorldIsland::advance(Real duration, Island& island) {
   }
   penalty::advance(island, duration);
   rigid_contacts = island.rigid_contacts;
+  hand_out(duration, island.records);
+}
+
+// A contact of two soft bodies, be they one, is one of each.
+void WorldIsland::hand_out(Real duration, std::span<const ContactRecord> records) {
+  for (const HeldBody* body : held) body->contacts->begin_step(duration);
+  for (const ContactRecord& record : records) {
+    HeldBody& body = *held[record.body];
+    BodyContact contact{.point = record.point,
+                        .normal = record.normal,
+                        .impulse = record.impulse,
+                        .gap = record.gap,
+                        .slides = record.slides};
+    if (record.other_rigid >= 0) {
+      body.contacts->add(*touched[record.other_rigid].object, contact);
+      continue;
+    }
+    HeldBody& other = *held[record.other_body];
+    body.contacts->add(*other.body, contact);
+    contact.normal *= -1;
+    contact.impulse *= -1;
+    other.contacts->add(*body.body, contact);
+  }
 }
 
 }  // namespace penalty

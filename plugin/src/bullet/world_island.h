@@ -1,5 +1,6 @@
 // What is stepped together.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "penalty/stepping/island.h"
@@ -27,8 +28,12 @@ struct WorldIsland {
   /// Whether both touch the same movable body.
   bool shares_a_rigid_body_with(const WorldIsland& other) const;
 
-  /// Advances all of it [s]; afterwards `island.rigid_bodies` are the states of the touched bodies.
+  /// Advances all of it [s]; afterwards `island.rigid_bodies` are the states of the touched bodies, and the held ones
+  /// know their contacts.
   void advance(Real duration, Island& island);
+
+ private:
+  void hand_out(Real duration, std::span<const ContactRecord> records);
 };
 
 }  // namespace penalty

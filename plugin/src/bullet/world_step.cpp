@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "body_anchors.h"
 #include "body_settings.h"
@@ -56,6 +57,7 @@ bool stays_in_range(HeldBody& held) noexcept {
 std::span<HeldBody* const> AttachedBodies::World::step(std::span<btSoftBody* const> listed, Real duration,
                                                        bool gravity_applied) noexcept {
   stepped_.clear();
+  to_be_told_of_.clear();
   islands_.clear();
   bodies->list(listed);
   if (!(duration > 0) || !std::isfinite(duration)) {
@@ -93,6 +95,7 @@ void AttachedBodies::World::hold_all(std::span<btSoftBody* const> listed, const 
 
 void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real duration) {
   stepped_.reserve(listed.size());
+  if (contact_callback) to_be_told_of_.reserve(listed.size());
   for (btSoftBody* body : listed)
     if (const HeldBody* held = bodies->find(*body)) {
       broadphase_ = body->getWorldInfo()->m_broadphase;  // which attach asked for
@@ -113,7 +116,10 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   for (WorldIsland& island : islands_) advance(island, duration);
   rigid_manifolds_.remember(islands_);
   for (btSoftBody* body : listed)
-    if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) stepped_.push_back(held);
+    if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) {
+      stepped_.push_back(held);
+      if (contact_callback && held->contacts->are_news()) to_be_told_of_.push_back(held->identity());
+    }
 }
 
 // Reads what the world says of the body and begins an island with it.
@@ -208,6 +214,29 @@ void AttachedBodies::World::freeze_held(std::span<btSoftBody* const> listed) con
 void AttachedBodies::World::thaw_held(std::span<btSoftBody* const> listed) const noexcept {
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::held) held->nodes.thaw();
+}
+
+// Any call may detach bodies, delete them, and set another callback.
+void AttachedBodies::World::tell_contacts() noexcept {
+  const auto is_in_world = [this](const HeldBody& held) {
+    return WorldObjects(broadphase_, held.box).contain(held.identity()) ||
+           WorldObjects(broadphase_).contain(held.identity());
+  };
+  const auto tell = [&](const Identity& name) {
+    const HeldBody* held = bodies->find(name);
+    const auto callback = contact_callback;
+    if (!held || held->outcome != StepOutcome::stepped || !callback || !*callback || !is_in_world(*held)) return;
+    const auto contacts = held->contacts;
+    (*callback)(*held->body, contacts->of(*held->body));
+  };
+  for (const Identity& name : std::exchange(to_be_told_of_, {}))
+    shield([&] { tell(name); },
+           [&](const char* said) {
+             HeldBody* held = bodies->find(name);
+             if (!held) return;
+             shield([&] { held->stepped.report.problem = std::string("the contact callback threw: ") + said; },
+                    [](const char*) {});
+           });
 }
 
 void AttachedBodies::World::correct_rigid_bodies(Real duration) noexcept {

@@ -20,6 +20,7 @@ class AttachedBodies::World {
  public:
   std::shared_ptr<HeldBodies> bodies = std::make_shared<HeldBodies>();  // handles look at it, too
   Couplings couplings;
+  std::shared_ptr<const ContactCallback> contact_callback;  // null: none so far
 
   /// Steps the attached and active ones of `listed`, all soft bodies of the world, from what their nodes say, together
   /// with the rigid bodies that they touch, whose velocities change. `gravity_applied`: the world has already added
@@ -37,6 +38,9 @@ class AttachedBodies::World {
   /// Moves touched rigid bodies to where the sub-cycle took them. Call after Bullet has integrated the transforms.
   void correct_rigid_bodies(Real duration) noexcept;
 
+  /// Calls who wants to know of contacts. The last thing in a step: bodies may be deleted in it.
+  void tell_contacts() noexcept;
+
  private:
   void hold_all(std::span<btSoftBody* const> listed, const char* problem, bool finite) noexcept;
   void step_all(std::span<btSoftBody* const> listed, Real duration);
@@ -51,6 +55,7 @@ class AttachedBodies::World {
   std::vector<WorldIsland> islands_;
   Island island_;  // the one that is being advanced; keeps its memory
   std::vector<HeldBody*> stepped_;
+  std::vector<Identity> to_be_told_of_;
   btBroadphaseInterface* broadphase_ = nullptr;
 };
 

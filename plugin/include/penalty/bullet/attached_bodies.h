@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "penalty/bullet/body_contact.h"
 #include "penalty/bullet/body_surface.h"
 #include "penalty/contact/weighted_point.h"
 #include "penalty/fields/ledger.h"
@@ -111,6 +113,22 @@ class AttachedBodies {
   const Particles& particles(const btSoftBody& body) const;
   const PotentialField& field(const btSoftBody& body) const;
   const StepReport& report(const btSoftBody& body) const;
+
+  /// What pressed on the body in its last step: what asks nothing of it, because it is further off than the margins, is not
+  /// among them. Of a body that sleeps it is what holds it. A contact between soft bodies is one of each, with opposite
+  /// normals and impulses, and one of a body with itself is there twice, so that the impulses add up to what the body was
+  /// given. Anchors and couplings are no contacts; what rigid bodies do to each other is in Bullet's manifolds, without
+  /// impulses where a soft body touches one of them. Good until the next step, or until the body is detached.
+  std::span<const BodyContact> contacts(const btSoftBody& body) const;
+
+  /// The sum of what soft bodies did to an object in the last step, over its duration: impulses of contacts.
+  ContactForce contact_force(const btCollisionObject& object) const;
+
+  /// Will be called at the end of every internal step of the world, once for each body that was stepped and touches
+  /// something, or did in its step before: with no contacts when it has come off. In it bodies may be changed, detached,
+  /// and removed from the world. What it throws goes no further than the report of the body, as a problem. Empty: nobody
+  /// is told.
+  void set_contact_callback(ContactCallback callback);
 
   /// Energy that came and went since the body was attached [J].
   const EnergyFlows& flows(const btSoftBody& body) const;

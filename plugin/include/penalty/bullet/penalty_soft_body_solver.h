@@ -25,6 +25,7 @@ class PenaltySoftBodySolver : public btDefaultSoftBodySolver, public AttachedBod
   void optimize(btAlignedObjectArray<btSoftBody*>& bodies, bool force_update = false) override;
   void predictMotion(btScalar time_step) override;
   void solveConstraints(btScalar time_step) override;
+  void updateSoftBodies() override;
   void processCollision(btSoftBody* body, const btCollisionObjectWrapper* object) override;
   void processCollision(btSoftBody* body, btSoftBody* other) override;
 
