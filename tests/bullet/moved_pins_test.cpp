@@ -181,7 +181,9 @@ TEST_P(MovedPins, HaveTheVelocityThatTheyWereGivenAgainWhenTheyAreThere) {
 TEST_P(MovedPins, ThatWereJustPinnedDoNotFlyOn) {
   btSoftBody& cape = add_cape(sim);
   sim.step(frame, 16);
-  constexpr int picked = 5;
+  int picked = 0;
+  for (int i = 0; i < cape.m_nodes.size(); ++i)
+    if (cape.m_nodes[i].m_v.length() > cape.m_nodes[picked].m_v.length()) picked = i;
   ASSERT_GT(Real(cape.m_nodes[picked].m_v.length()), 0.01);
   cape.setMass(picked, 0);
   const btVector3 hand = cape.m_nodes[picked].m_x + btVector3(0, btScalar(0.01), 0);

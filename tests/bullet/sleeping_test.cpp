@@ -45,14 +45,15 @@ TEST_P(Sleeping, ARigidBodyThatHitsItWakesIt) {
   ASSERT_GT(time_to_sleep({body}), 0);
   const PackedVectors before = sim.penalty().particles(*body).positions;
   btRigidBody& box = sim.add_box({0.1, 0.1, 0.1}, 1, {0, 1.5, 0});
-  Real deepest = 0;
+  Real deepest = 0, lowest_of_box = 2;  // before it rolls off
   for (int step = 0; step < 60; ++step) {
     sim.step(frame);
     deepest = std::max(deepest, (sim.penalty().particles(*body).positions - before).cwiseAbs().maxCoeff());
+    if (step < 40) lowest_of_box = std::min(lowest_of_box, Real(box.getWorldTransform().getOrigin().y()));
   }
   EXPECT_TRUE(body->isActive());
   EXPECT_GT(deepest, 0.01) << "gave way";
-  EXPECT_GT(Real(box.getWorldTransform().getOrigin().y()), 0.15) << "did not fall through";
+  EXPECT_GT(lowest_of_box, 0.5) << "did not fall through";
 }
 
 TEST_P(Sleeping, ActivateWakesIt) {

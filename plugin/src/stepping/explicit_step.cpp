@@ -15,7 +15,8 @@
 namespace penalty {
 namespace {
 
-constexpr int most_blocks = 8;             // of substeps, after each of which there is damping and plastic flow
+constexpr int most_blocks = 8;             // of substeps, after each of which there is plastic flow,
+constexpr int damped_blocks = 2;           // and damping, where bodies touch: an impact lasts no longer
 constexpr Real retry_growth = 1.5;         // substeps of a repeated step
 constexpr int most_sweeps = 50;            // of a substep; they end when one changes speeds by less than
 constexpr Real rigid_tolerance = 1e-3;     // this share of the first, between rigid bodies,
@@ -63,18 +64,23 @@ class SubCycle {
         !particle_contacts_.is_empty() || !anchors_.is_empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
     are_coupled_ = !rigid_contacts_.is_empty() || !anchors_.is_empty() || particle_contacts_.are_coupled();
     for (const SteppedBody* body : island_.bodies) {
-      has_blocks_ = has_blocks_ || damps(*body) || body->field->evolves();
+      damps_ = damps_ || damps(*body);
+      evolves_ = evolves_ || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
         if (body->particles.inverse_masses[i] == 0 && !body->particles.velocities.col(i).isZero(0))
           has_driven_particles_ = true;
     }
-    for (const Coupling* coupling : island_.couplings)
-      has_blocks_ = has_blocks_ || damps(*coupling) || coupling->field->evolves();
+    for (const Coupling* coupling : island_.couplings) {
+      damps_ = damps_ || damps(*coupling);
+      evolves_ = evolves_ || coupling->field->evolves();
+    }
   }
 
   /// Returns how many substeps it took: `substeps`, rounded up to whole blocks.
   int run(int substeps) {
-    const int blocks = has_blocks_ ? std::clamp(substeps / 4, 1, most_blocks) : 1;
+    const int dampings = !damps_ ? 0 : has_contacts_ ? std::min(damped_blocks, substeps) : 1;
+    int blocks = std::max(dampings, 1);
+    if (evolves_) blocks *= std::max(std::clamp(substeps / 4, 1, most_blocks) / blocks, 1);
     const int per_block = (substeps + blocks - 1) / blocks;
     const Real h = duration_ / (blocks * per_block);
     outside_work_ = since_contacts_ = 0;
@@ -82,7 +88,12 @@ class SubCycle {
     particle_contacts_.begin_attempt();
     anchors_.begin_attempt();
     remaining_ = duration_;
-    for (SteppedBody* body : island_.bodies) body->step_flows = {};
+    for (SteppedBody* body : island_.bodies) {
+      body->step_flows = {};
+      body->is_pushed = false;
+      body->damper.begin_step();
+    }
+    island_.is_held_up = false;
     for (int block = 0; block < blocks; ++block) {
       Real kick_time = h / 2;
       for (int k = 0; k < per_block; ++k) {
@@ -91,11 +102,16 @@ class SubCycle {
       }
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
-      if (!surfaces_.is_empty())
-        solve_contacts(0, h, [&] { surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); }); });
-      else if (!rigid_contacts_.is_empty() || !anchors_.is_empty())
-        solve_contacts(0, h, [&] { converge(h); });
-      if (has_blocks_) end_block(duration_ / blocks);
+      // Of a velocity that contacts have not seen there is nothing to damp, and nothing is handed out.
+      if (has_contacts_) solve_contacts(0, h, [&] { close(h); });
+      if (evolves_) evolve(duration_ / blocks);
+      const bool damps_now = dampings > 0 && (block + 1) % (blocks / dampings) == 0;
+      const bool settles_now = island_.is_held_up && block + 1 == blocks;
+      if (damps_now) damp(duration_ / dampings);
+      if (settles_now)
+        for (SteppedBody* body : island_.bodies)
+          if (body->is_pushed) settle(*body, duration_);
+      if (has_contacts_ && (damps_now || settles_now)) solve_contacts(0, h, [&] { close_again(h); });
     }
     return blocks * per_block;
   }
@@ -182,28 +198,42 @@ class SubCycle {
     for (const Coupling* coupling : island_.couplings) kick(*coupling, island_, time);
   }
 
-  // Damping, plastic flow, breaking.
-  void end_block(Real duration) {
+  void close(Real h) {
+    if (surfaces_.is_empty())
+      converge(h);
+    else
+      surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); });
+  }
+  void close_again(Real h) {
+    if (surfaces_.is_empty())
+      converge(h);
+    else
+      surfaces_.close_again(h, [this, h] { return sweep(h); });
+  }
+
+  // Plastic flow and breaking.
+  void evolve(Real duration) {
     for (SteppedBody* body : island_.bodies) {
-      if (damps(*body)) {
-        const Real before = kinetic_energy(body->particles);
-        body->field->dissipate(body->particles.positions, body->particles.inverse_masses, body->options.damping_time,
-                               duration, body->particles.velocities);
-        const Real lost = before - kinetic_energy(body->particles);
-        body->step_flows.damping += lost;
-        if (has_driven_particles_) outside_work_ -= lost;  // what drives them may give energy through the damping
-      }
-      if (body->field->evolves()) {
-        const Real taken = body->field->evolve(body->particles.positions, duration);
-        body->step_flows.inelastic += taken;
-        if (taken != 0) evaluate_forces(*body);
-      }
+      if (!body->field->evolves()) continue;
+      const Real taken = body->field->evolve(body->particles.positions, duration);
+      body->step_flows.inelastic += taken;
+      if (taken != 0) evaluate_forces(*body);
     }
-    for (Coupling* coupling : island_.couplings) {
-      if (damps(*coupling)) outside_work_ += dissipate(*coupling, island_, duration);
+    for (Coupling* coupling : island_.couplings)
       if (coupling->field->evolves() && coupling->field->evolve(coupling->positions, duration) != 0)
         evaluate_forces(*coupling, island_);
+  }
+
+  void damp(Real duration) {
+    for (SteppedBody* body : island_.bodies) {
+      if (!damps(*body)) continue;
+      const Damper::Damped damped =
+          body->damper.damp(*body->field, body->options.damping_time, duration, has_driven_particles_, body->particles);
+      body->step_flows.damping += damped.lost;
+      if (has_driven_particles_) outside_work_ -= damped.lost;  // what drives them may give energy through the damping
     }
+    for (Coupling* coupling : island_.couplings)
+      if (damps(*coupling)) outside_work_ += dissipate(*coupling, island_, duration);
   }
 
   void add_driving_work(Real time) {
@@ -234,34 +264,10 @@ class SubCycle {
   Real since_contacts_ = 0;  // time of the kicks since contacts were solved [s]
   Real first_change_ = 0;    // of a normal speed by the first sweep [m/s]
   int sweeps_ = 0;
-  bool has_contacts_ = false, are_coupled_ = false, has_blocks_ = false, has_driven_particles_ = false;
+  bool has_contacts_ = false, are_coupled_ = false, damps_ = false, evolves_ = false;
+  bool has_driven_particles_ = false;
   Real outside_work_ = 0;
 };
-
-// Kinetic + elastic energy of an island.
-Real energy(const Island& island) {
-  Real sum = 0;
-  for (const Coupling* coupling : island.couplings) sum += coupling->elastic_energy;
-  for (const SteppedBody* body : island.bodies) sum += body->elastic_energy + kinetic_energy(body->particles);
-  for (const RigidBody& body : island.rigid_bodies) sum += kinetic_energy(body);
-  return sum;
-}
-
-// Work of gravity, external forces and accelerations since the start of the step.
-Real constant_force_work(Island& island) {
-  Real work = 0;
-  for (SteppedBody* body : island.bodies) {
-    body->step_flows.constant_forces = constant_force_work(*body);
-    work += body->step_flows.constant_forces;
-  }
-  for (std::size_t k = 0; k < island.rigid_bodies.size(); ++k) {
-    const RigidBody& body = island.rigid_bodies[k];
-    for (int axis = 0; axis < 3; ++axis)
-      work += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] *
-              (body.position[axis] - island.rigid_start[k].position[axis]);
-  }
-  return work;
-}
 
 void find_touching(Island& island, const SurfaceContacts& surfaces) {
   island.touching.resize(island.bodies.size());

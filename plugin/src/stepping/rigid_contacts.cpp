@@ -96,11 +96,11 @@ Real RigidContacts::sweep() {
 }
 
 void RigidContacts::end(Real since) {
+  if (!(since > 0)) return;
   for (std::size_t k = 0; k < rows_.size(); ++k)
     island_.rigid_contacts[k].force =
-        since > 0 && !rows_[k].is_impact
-            ? Vector3((rows_[k].impulse * rows_[k].normal + rows_[k].friction_impulse) / since)
-            : Vector3::Zero();
+        !rows_[k].is_impact ? Vector3((rows_[k].impulse * rows_[k].normal + rows_[k].friction_impulse) / since)
+                            : Vector3::Zero();
 }
 
 void RigidContacts::begin_attempt() {

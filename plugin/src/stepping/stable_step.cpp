@@ -35,7 +35,13 @@ Real gershgorin_bound(const PotentialField& field, const Positions& x, std::span
 }
 
 Real largest_eigenvalue_bound(const PotentialField& field, const Positions& x, std::span<const Real> inverse_masses) {
-  const Real ceiling = gershgorin_bound(field, x, inverse_masses);
+  return largest_eigenvalue_bound(
+      [&](const Vectors& in, Forces out) { field.add_product(x, StiffnessModel::taut, in, 1, out); },
+      gershgorin_bound(field, x, inverse_masses), inverse_masses);
+}
+
+Real largest_eigenvalue_bound(const std::function<void(const Vectors&, Forces)>& add_product, Real ceiling,
+                              std::span<const Real> inverse_masses) {
   const auto num_particles = static_cast<Eigen::Index>(inverse_masses.size());
   if (!(ceiling > 0)) return ceiling;
 
@@ -46,7 +52,7 @@ Real largest_eigenvalue_bound(const PotentialField& field, const Positions& x, s
   const auto apply = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
     in.topRows<3>() = (v.array() * scale).matrix().reshaped(3, num_particles);
     out.setZero();
-    field.add_product(x, StiffnessModel::taut, in, 1, out);
+    add_product(in, out);
     return (out.topRows<3>().reshaped().array() * scale).matrix();
   };
 

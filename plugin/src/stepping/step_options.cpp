@@ -22,6 +22,7 @@ void StepOptions::check() const {
   const auto require = [](bool ok, const char* name, Real value, const char* range) {
     if (!ok) throw std::invalid_argument(std::string("step: ") + name + " is " + to_text(value) + ", must be " + range);
   };
+  require(settling_speed >= 0 && std::isfinite(settling_speed), "settling_speed", settling_speed, "zero or positive");
   require(damping_time >= 0 && std::isfinite(damping_time), "damping_time", damping_time, "zero or positive [s]");
   require(drag >= 0 && std::isfinite(drag), "drag", drag, "zero or positive [1/s]");
   require(substeps >= 0, "substeps", substeps, "zero (automatic) or positive");

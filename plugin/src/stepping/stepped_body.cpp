@@ -63,6 +63,28 @@ void undo_step(SteppedBody& body) {
   evaluate_forces(body);
 }
 
+void settle(SteppedBody& body, Real duration) {
+  constexpr Real settling_rate = 6;  // of the slowest motion, relative to sqrt(g / size)
+  const Real gravity = body.gravity.norm();
+  const Real fastest = body.options.settling_speed * std::sqrt(gravity * body.size);
+  if (!(fastest > 0) || !(body.mass > 0)) return;
+  Particles& particles = body.particles;
+  const Vector3 mean = linear_momentum(particles) / body.mass;
+  Real within = 0;
+  for (int i = 0; i < particles.size(); ++i) {
+    if (particles.inverse_masses[i] == 0) return;  // held by that, it needs no settling
+    within += (particles.velocities.col(i).head<3>() - mean).squaredNorm() / particles.inverse_masses[i];
+  }
+  const Real rate = settling_rate * std::sqrt(gravity / body.size) * (1 - within / (body.mass * fastest * fastest));
+  if (!(rate > 0)) return;
+  const Real kept = std::exp(-rate * duration);
+  for (int i = 0; i < particles.size(); ++i) {
+    auto v = particles.velocities.col(i).head<3>();
+    v = mean + kept * (v - mean);
+  }
+  body.step_flows.drag += within / 2 * (1 - kept * kept);
+}
+
 void end_step(SteppedBody& body, Real duration) {
   StepReport& report = body.report;
   report.elastic_energy = body.elastic_energy;
@@ -89,6 +111,29 @@ Real constant_force_work(const SteppedBody& body) {
   return body.gravity.dot(mass_displacement) + external_work;
 }
 
+Real energy(const Island& island) {
+  Real sum = 0;
+  for (const Coupling* coupling : island.couplings) sum += coupling->elastic_energy;
+  for (const SteppedBody* body : island.bodies) sum += body->elastic_energy + kinetic_energy(body->particles);
+  for (const RigidBody& body : island.rigid_bodies) sum += kinetic_energy(body);
+  return sum;
+}
+
+Real constant_force_work(Island& island) {
+  Real work = 0;
+  for (SteppedBody* body : island.bodies) {
+    body->step_flows.constant_forces = constant_force_work(*body);
+    work += body->step_flows.constant_forces;
+  }
+  for (std::size_t k = 0; k < island.rigid_bodies.size(); ++k) {
+    const RigidBody& body = island.rigid_bodies[k];
+    for (int axis = 0; axis < 3; ++axis)
+      work += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] *
+              (body.position[axis] - island.rigid_start[k].position[axis]);
+  }
+  return work;
+}
+
 void name_bad_particles(std::span<SteppedBody* const> bodies) {
   bool named = false;
   for (SteppedBody* body : bodies) {
@@ -108,6 +153,8 @@ void estimate_stability(SteppedBody& body) {
   const Real extent2 =
       points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).squaredNorm();
   body.rest_span = affine_span(rest);
+  body.damper.forget();
+  body.size = std::sqrt(extent2);
   body.energy_noise = 1e-15 * body.mass * body.largest_eigenvalue * extent2;
   if (body.mass > 0) return;
   // Held altogether it has no mass to go by, but round-off in how it is driven, too.

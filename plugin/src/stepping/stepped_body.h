@@ -19,11 +19,21 @@ Real begin_step(SteppedBody& body, bool may_unfold = true);
 /// Goes back to the state that `begin_step` kept.
 void undo_step(SteppedBody& body);
 
+/// Slows the slow motion within a body that something holds up against gravity: what no material's damping stops, the
+/// sway of a tower and the rocking of a stack. The mean velocity stays.
+void settle(SteppedBody& body, Real duration);
+
 /// Takes the drag of a step and closes its books.
 void end_step(SteppedBody& body, Real duration);
 
 /// Work of gravity and external forces since the start of the step [J].
 Real constant_force_work(const SteppedBody& body);
+
+/// Kinetic + elastic energy of an island [J].
+Real energy(const Island& island);
+
+/// Work of gravity, external forces and accelerations of an island since the start of the step [J].
+Real constant_force_work(Island& island);
 
 /// Names the particle to look at after a step that could not be made finite, in the state that it started from: one
 /// that is not finite itself; if there is none in the island, the fastest of each body.

@@ -117,6 +117,15 @@ void SurfaceContacts::close(Real h, Real since, const RigidSweep& rigid_sweep) {
   book();
 }
 
+void SurfaceContacts::close_again(Real h, const RigidSweep& rigid_sweep) {
+  for (TouchingPair& pair : scratch_.pairs) {
+    pair.given = 0;
+    pair.rubbed.setZero();
+  }
+  converge(h, 0, rigid_sweep);
+  book();
+}
+
 void SurfaceContacts::drifted(Real h) {
   for (ContactSurface* surface : surfaces_)
     if (surface) surface->drift(h);
@@ -297,7 +306,10 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
     if (pair.memory)
       pair.memory->keep(pair.given * pair.axes.col(0) + pair.axes.rightCols<2>() * pair.rubbed, pair.axes.col(0),
                         since);
-    changed = changed || pair.given > 0;
+    if (!(pair.given > 0)) continue;
+    changed = true;
+    for (const int body : {pair.body_a, pair.body_b}) island_.bodies[body]->is_pushed = true;
+    if (pair.rigid && !pair.rigid->is_dynamic()) island_.is_held_up = island_.is_held_up || pair.rigid->is_at_rest();
   }
   return changed || !island_.contacts.empty() || !island_.rigid_contacts.empty();
 }

@@ -125,6 +125,8 @@ class SurfaceContacts {
 
   /// The same where nothing drifts: takes the approach that the last half kick left.
   void close(Real h, Real since, const RigidSweep& rigid_sweep);
+  /// Once more where only velocities have changed since.
+  void close_again(Real h, const RigidSweep& rigid_sweep);
 
   /// After the drift.
   void drifted(Real h);

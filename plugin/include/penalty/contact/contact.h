@@ -28,10 +28,11 @@ class ContactMemory {
   /// The impulse to start from, after forces have acted for `since` [s] from the last substep on [N s].
   Vector3 start(Real since) const { return since * share_ * force_; }
 
-  /// Keeps `impulse` [N s], of forces that acted for `since` [s].
+  /// Keeps `impulse` [N s], of forces that acted for `since` [s]; of none, as after damping, it says nothing.
   void keep(const Vector3& impulse, const Vector3& normal, Real since) {
+    if (!(since > 0)) return;
     const Real before = normal_force_;
-    force_ = since > 0 ? Vector3(impulse / since) : Vector3::Zero();
+    force_ = impulse / since;
     normal_force_ = normal.dot(force_);
     share_ = normal_force_ > 0 ? std::clamp<Real>(before / normal_force_, 0, 1) : 0;
   }

@@ -27,7 +27,9 @@ class Batch final : public ElementBatch {
 
   /// `name` tells batches of one kind apart, in messages and in the ledger.
   explicit Batch(int num_particles, std::string name = std::string(Kind::name))
-      : ElementBatch(num_particles, std::move(name), Constraint<Kind>, period_of<Kind>) {}
+      : ElementBatch(num_particles, std::move(name), Constraint<Kind>, period_of<Kind>) {
+    has_damping_modes_ = !HasRigidDamping<Kind>;
+  }
 
   /// Throws std::invalid_argument for an index outside [0, num_particles), for equal indices and for a stiffness that
   /// is not positive and finite; the message names batch, element and value.
@@ -65,6 +67,7 @@ class Batch final : public ElementBatch {
   void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale, Forces df) const override;
   void add_bounds(const Positions& x, std::span<Real> bounds) const override;
   void add_damping(const Positions& x, Real time, System& damping) const override;
+  void add_damping_modes(const Positions& x, Real time, Real duration, DampingModes& modes) const override;
   void dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,
                  Forces v) const override;
   Real evolve(const Positions& x, Real duration) override;
@@ -79,10 +82,15 @@ class Batch final : public ElementBatch {
   struct FixedScratch {
     Points<num_points> points, vectors;
     Gradient<num_points> gradient;
+    FixedScratch() {}  // leaves them as they are: to fill them with zeros takes as long as some kinds do
   };
   struct KeptScratch : FixedScratch {
     std::vector<Real> inverse_masses;
-    explicit KeptScratch(Eigen::Index n) : FixedScratch{{3, n}, {3, n}, {3, n}}, inverse_masses(n) {}
+    explicit KeptScratch(Eigen::Index n) : inverse_masses(n) {
+      this->points.resize(3, n);
+      this->vectors.resize(3, n);
+      this->gradient.resize(3, n);
+    }
   };
   using Scratch = std::conditional_t<num_points == dynamic, KeptScratch, FixedScratch>;
   struct Nothing {};

@@ -14,7 +14,36 @@ void Batch<Kind>::visit_damping_modes(std::size_t e, Scratch& s, const Visit& vi
     kinds_[e].visit_damping_modes(s.points, visit);
   } else {
     const Real psi = kinds_[e].energy_and_gradient(s.points, s.gradient);
-    if (psi > 0) visit(1 / (2 * psi), s.gradient);
+    visit(psi > 0 ? 1 / (2 * psi) : 0, s.gradient);
+  }
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_damping_modes(const Positions& x, Real time, Real duration, DampingModes& modes) const {
+  if constexpr (!HasRigidDamping<Kind>) {
+    for (std::size_t e = 0; e < stencils_.size(); ++e) {
+      auto&& s = scratch(e);
+      gather(e, x, s.points);
+      const Stencil& stencil = stencils_[e];
+      const Real damping = is_slack(e, s.points) ? 0 : damping_time(e, time) * duration * stiffnesses_[e];
+      int i = 0, j = 1;  // the edge whose turn it is
+      visit_damping_modes(e, s, [&](Real weight, const Gradient<num_points>& mode) {
+        if constexpr (damps_edges<Kind>) {
+          if (i < num_points - 1) {
+            if (modes.is_counting())
+              modes.count(std::array{stencil[i], stencil[j]}, true);
+            else
+              modes.add(damping * weight, mode.template middleCols<1>(i));
+            if (++j == num_points) j = ++i + 1;
+            return;
+          }
+        }
+        if (modes.is_counting())
+          modes.count(stencil, conserves_momentum<Kind>);
+        else
+          modes.add(damping * weight, mode);
+      });
+    }
   }
 }
 

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "penalty/energy/penalty_energy.h"
+#include "penalty/fields/damping_modes.h"
 #include "penalty/fields/system.h"
 
 namespace penalty {
@@ -67,8 +68,12 @@ class Potential {
   /// damping to stiffness, to which elements with a damping time of their own add it. The force is F = -D v.
   virtual void add_damping(const Positions& /*x*/, Real /*time*/, System& /*damping*/) const {}
 
+  /// The same matrix times `duration` as modes, where `has_damping_modes`; others damp by `dissipate` alone.
+  virtual void add_damping_modes(const Positions& /*x*/, Real /*time*/, Real /*duration*/,
+                                 DampingModes& /*modes*/) const {}
+
   /// Takes velocity along the constraint gradients away, implicitly and element by element, as F = -D v acting for
-  /// `duration` would. Each update is a set of internal impulses: linear and angular momentum stay what they are, and
+  /// `duration` would, but no more than neighbours that move along allow: for few elements. Each update is a set of internal impulses: linear and angular momentum stay what they are, and
   /// kinetic energy only falls, for any duration. Particles of zero inverse mass keep their velocity.
   virtual void dissipate(const Positions& /*x*/, std::span<const Real> /*inverse_masses*/, Real /*time*/,
                          Real /*duration*/, Forces /*v*/) const {}
@@ -89,6 +94,7 @@ class Potential {
 
   /// Some elements have a damping time of their own: `dissipate` has work to do even at time 0.
   bool damps() const { return damps_; }
+  bool has_damping_modes() const { return has_damping_modes_; }
   bool evolves() const { return evolves_; }  // `evolve` may have something to do
 
   /// Grows with every change that may raise the stiffness: what was estimated from it is then out of date.
@@ -97,7 +103,7 @@ class Potential {
  protected:
   std::string name_;
   std::size_t num_elements_ = 0;
-  bool damps_ = false, evolves_ = false;
+  bool damps_ = false, has_damping_modes_ = false, evolves_ = false;
   std::uint64_t stiffness_version_ = 0;
 };
 

@@ -90,6 +90,16 @@ concept HasDampingModes = ElasticEnergy<Kind> && requires(const Kind kind, const
   kind.visit_damping_modes(p, [](Real, const Gradient<Kind::num_points>&) {});
 };
 
+/// Whether the first of these modes are those of the edges, (0, 1), (0, 2) .. (n-2, n-1), each along its edge:
+/// `static constexpr bool damps_edges`. Those of neighbours are then one.
+template <class Kind>
+inline constexpr bool damps_edges = [] {
+  if constexpr (requires { Kind::damps_edges; })
+    return Kind::damps_edges;
+  else
+    return false;
+}();
+
 /// Or all motion but the rigid one: `damping_force(p, v, d)` of the group, `damp(p, inverse_masses, d * duration, v)`,
 /// its implicit step, and `visit_damping(p, visit_diagonal, visit_mode)`, its matrix.
 template <class Kind>

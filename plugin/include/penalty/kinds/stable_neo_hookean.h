@@ -32,6 +32,7 @@ namespace penalty {
 struct StableNeoHookean {
   static constexpr std::string_view name = "stable neo-Hookean";
   static constexpr int num_points = 4;
+  static constexpr bool damps_edges = true;
 
   /// A prototype for `at_rest`; lambda/mu = 2 nu / (1 - 2 nu). Throws std::invalid_argument for a ratio that is
   /// negative or not finite.

@@ -8,6 +8,7 @@
 #include "penalty/fields/potential_field.h"
 #include "penalty/math/affine_span.h"
 #include "penalty/stepping/contact_record.h"
+#include "penalty/stepping/damper.h"
 #include "penalty/stepping/newton.h"
 #include "penalty/stepping/particles.h"
 #include "penalty/stepping/rigid_body.h"
@@ -51,10 +52,13 @@ struct SteppedBody {
   int last_substeps = 0;            // what the energy guard settled on
   Real mass = 0;                    // of the particles that are not pinned [kg]
   Real energy_noise = 0;            // growth of energy that means nothing [J]
+  Real size = 0;                    // diagonal of the box about the rest shape [m]
   PackedVectors before_contacts;    // velocities [m/s]
+  bool is_pushed = false;           // by contacts, in this step
   Particles start;                  // positions and velocities to go back to,
   FieldState start_state;           // and what flowed, broke and changed phase
   AffineSpan rest_span;
+  Damper damper;
   ImplicitState implicit;
 };
 
@@ -100,6 +104,7 @@ struct Island {
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};
   std::vector<char> touching = {};  // bodies that may touch something
+  bool is_held_up = false;          // something that is at rest for good pushed one of the bodies in this step
   std::shared_ptr<std::vector<ParticleContactRow>> particle_contact_rows = {};
   std::shared_ptr<SurfaceScratch> surface_scratch = {};
 };
@@ -116,9 +121,10 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// Advances an island over `duration` [s] and says what was done; a duration that is not positive and finite is no
 /// step.
 ///
-/// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with sweeps over the contacts before each drift. At
-/// the start and the end positions and velocities belong to the same instant, and only there, or at the end of a block
-/// of substeps, is damping applied: touched half a substep apart, it would feed the fastest modes. The number of
+/// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with sweeps over the contacts before each drift and
+/// after the last kick: no velocity is handed out that contacts have not seen. At the start and the end positions and
+/// velocities belong to the same instant, and only there, or in the middle where bodies touch, is damping applied, see
+/// Damper: touched half a substep apart, it would feed the fastest modes. The number of
 /// substeps follows from the stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That limit
 /// belongs to the rest shape; far from it a step may still gain energy. If kinetic + elastic energy, less the work of
 /// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as

@@ -21,6 +21,8 @@ struct RigidBody {
 
   bool is_dynamic() const { return !inverse_mass.isZero(0) || !inverse_inertia.isZero(0); }
 
+  bool is_at_rest() const { return !is_dynamic() && velocity.isZero(0) && angular_velocity.isZero(0); }
+
   /// It takes impulses and moments in every direction.
   bool is_free() const;
 

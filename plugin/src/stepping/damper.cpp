@@ -1,0 +1,138 @@
+#include "penalty/stepping/damper.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "penalty/stepping/stable_step.h"
+
+namespace penalty {
+namespace {
+
+constexpr int most_stages = 200;
+constexpr int most_tries = 5;
+constexpr Real near_rest = 1.02;                        // growth of the bound that is none;
+constexpr Real safety_at_rest = 1.05, safety = 1.35;    // of the largest eigenvalue then, and else times the growth
+constexpr Real damping_parameter = 1.3169578969248166;  // d = arcosh 2
+
+// The largest z of |R_s(z)| <= 1/2.
+Real reach(int stages) {
+  const Real d = damping_parameter / stages;
+  return (1 + std::cosh(d)) * stages * std::tanh(damping_parameter) / std::sinh(d);
+}
+
+int stages_to_reach(Real z) {
+  int stages = std::max(static_cast<int>(std::sqrt(std::min<Real>(z, 2 * most_stages * most_stages) / 1.5)), 1);
+  while (stages < most_stages && reach(stages) < z) ++stages;
+  return std::min(stages, most_stages);
+}
+
+Real kinetic_energy(const PackedVectors& velocities, const Particles& particles) {
+  Real sum = 0;
+  for (int i = 0; i < particles.size(); ++i)
+    if (particles.inverse_masses[i] > 0) sum += velocities.col(i).squaredNorm() / particles.inverse_masses[i];
+  return sum / 2;
+}
+
+}  // namespace
+
+void Damper::set_modes(const PotentialField& field, const Positions& x, Real damping_time, Real duration) {
+  modes_.begin();
+  for (std::size_t k = 0; k < acting_.size(); ++k)
+    if (acting_[k]) field.potentials()[k]->add_damping_modes(x, damping_time, duration, modes_);
+  modes_.end();
+}
+
+Real Damper::row_bound(const Particles& particles) {
+  bounds_.assign(particles.inverse_masses.size(), 0);
+  modes_.add_bounds(bounds_);
+  Real largest = 0;
+  for (std::size_t i = 0; i < bounds_.size(); ++i)
+    largest = std::max(largest, bounds_[i] * particles.inverse_masses[i]);
+  return largest;
+}
+
+void Damper::prepare(const PotentialField& field, Real damping_time, const Particles& particles) {
+  bool same = is_prepared_ && damping_time == damping_time_ && field.stiffness_version() == stiffness_version_ &&
+              acting_.size() == field.potentials().size();
+  for (std::size_t k = 0; same && k < acting_.size(); ++k)
+    same = acting_[k] == (field.acts(k) && field.potentials()[k]->has_damping_modes());
+  if (same) return;
+  acting_.resize(field.potentials().size());
+  for (std::size_t k = 0; k < acting_.size(); ++k)
+    acting_[k] = field.acts(k) && field.potentials()[k]->has_damping_modes();
+  const PackedVectors& rest = field.rest_positions();
+  modes_ = DampingModes::with_pattern([&](DampingModes& modes) {
+    for (std::size_t k = 0; k < acting_.size(); ++k)
+      if (acting_[k]) field.potentials()[k]->add_damping_modes(rest, damping_time, 1, modes);
+  });
+  set_modes(field, rest, damping_time, 1);
+  rest_bound_ = row_bound(particles);
+  rest_eigenvalue_ = largest_eigenvalue_bound([this](const Vectors& in, Forces out) { modes_.add_product(in, out); },
+                                              rest_bound_, particles.inverse_masses);
+  for (PackedVectors* vectors : {&now_, &change_, &change_before_, &product_}) vectors->setZero(4, particles.size());
+  damping_time_ = damping_time;
+  stiffness_version_ = field.stiffness_version();
+  is_prepared_ = true;
+}
+
+// Leaves in `now_` what the velocities become. The recurrence is that of what has been changed so far: round-off in the
+// velocities themselves would grow with the square of the stages.
+void Damper::run_stages(int stages, Real share, const Particles& particles) {
+  const Real d = damping_parameter / stages;
+  const Real w0 = std::cosh(d), w1 = share * std::sinh(d) / (stages * std::tanh(damping_parameter));
+  now_ = particles.velocities;
+  change_.setZero();
+  change_before_.setZero();
+  product_.setZero();
+  // change <- a change + b change before - c M^-1 D now
+  const auto stage = [&](Real a, Real b, Real c) {
+    modes_.add_product(now_, product_);
+    for (int i = 0; i < particles.size(); ++i) {
+      if (const Real inverse_mass = particles.inverse_masses[i]; inverse_mass > 0) {
+        change_before_.col(i) = a * change_.col(i) + b * change_before_.col(i) - (c * inverse_mass) * product_.col(i);
+        now_.col(i) = particles.velocities.col(i) + change_before_.col(i);
+      }
+      product_.col(i).setZero();
+    }
+    change_.swap(change_before_);
+  };
+  Real t_before = 1, t_now = w0;  // T_j(w0)
+  stage(1, 0, w1 / w0);
+  for (int j = 2; j <= stages; ++j) {
+    const Real t_next = 2 * w0 * t_now - t_before;
+    stage(2 * w0 * t_now / t_next, -t_before / t_next, 2 * w1 * t_now / t_next);
+    t_before = std::exchange(t_now, t_next);
+  }
+}
+
+Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real duration, bool are_driven,
+                            Particles& particles) {
+  const Real kinetic = penalty::kinetic_energy(particles);
+  Damped damped;
+  prepare(field, damping_time, particles);
+  if (rest_bound_ > 0 && std::isfinite(kinetic)) {
+    set_modes(field, particles.positions, damping_time, duration);
+    if (growth_ == 0) growth_ = row_bound(particles) / (duration * rest_bound_);
+    const Real largest =
+        std::min(duration * rest_eigenvalue_ * (growth_ <= near_rest ? safety_at_rest : safety * growth_), 1e300);
+    int stages = stages_to_reach(largest);
+    damped.share = std::min<Real>(reach(stages) / largest, 1);
+    for (int tries = 0; tries < most_tries; ++tries) {
+      run_stages(stages, damped.share, particles);
+      damped.stages += stages;
+      if (are_driven || kinetic_energy(now_, particles) <= kinetic * (1 + 1e-12)) {
+        particles.velocities = now_;  // not swapped: contacts point into it
+        break;
+      }
+      stages = stages + stages / 2 + 1;
+    }
+  }
+  for (std::size_t k = 0; k < acting_.size(); ++k)
+    if (field.acts(k) && !acting_[k])
+      field.potentials()[k]->dissipate(particles.positions, particles.inverse_masses, damping_time, duration,
+                                       particles.velocities);
+  damped.lost = kinetic - penalty::kinetic_energy(particles);
+  return damped;
+}
+
+}  // namespace penalty
