@@ -89,6 +89,7 @@ INSTANTIATE_TEST_SUITE_P(All, BarDamping,
 // The largest speed of a particle over a step, from positions: what is seen to move.
 Real largest_motion(SurfaceBodies& bodies, int count) {
   std::vector<PackedVectors> before;
+  before.reserve(count);
   for (int k = 0; k < count; ++k) before.push_back(bodies[k].particles().positions);
   bodies.step();
   Real largest = 0;
