@@ -86,6 +86,20 @@ INSTANTIATE_TEST_SUITE_P(All, BarDamping,
                                            Bar{"free", false, ElasticModel::springs_volumes}),
                          [](const auto& bar) { return bar.param.name; });
 
+TEST(Damping, OfElementsMayBeSetLater) {
+  Body bar = make_beam_body(1);
+  ElementBatch& springs = bar.field->batch("length");
+  springs.set_damping_time(0);
+  Random random(1);
+  for (int i = 0; i < bar.particles().size(); ++i) bar.set_velocity(i, random.vector(0.1));
+  advance(bar, 1.0 / 60);
+  EXPECT_EQ(bar.body.flows.damping, 0);
+  springs.set_damping_time(0.1);
+  const Real before = bar.energy();
+  for (int step = 0; step < 60; ++step) advance(bar, 1.0 / 60);
+  EXPECT_LT(bar.energy(), 0.5 * before);
+}
+
 // The largest speed of a particle over a step, from positions: what is seen to move.
 Real largest_motion(SurfaceBodies& bodies, int count) {
   std::vector<PackedVectors> before;
