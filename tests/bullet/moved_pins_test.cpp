@@ -180,7 +180,8 @@ TEST_P(MovedPins, HaveTheVelocityThatTheyWereGivenAgainWhenTheyAreThere) {
 
 TEST_P(MovedPins, ThatWereJustPinnedDoNotFlyOn) {
   btSoftBody& cape = add_cape(sim);
-  sim.step(frame, 16);
+  cape.addVelocity(btVector3(btScalar(0.5), 0, 1));
+  sim.step(frame, 2);
   int picked = 0;
   for (int i = 0; i < cape.m_nodes.size(); ++i)
     if (cape.m_nodes[i].m_v.length() > cape.m_nodes[picked].m_v.length()) picked = i;

@@ -15,8 +15,8 @@
 namespace penalty {
 namespace {
 
-constexpr int most_blocks = 8;             // of substeps, after each of which there is plastic flow,
-constexpr int damped_blocks = 2;           // and damping, where bodies touch: an impact lasts no longer
+constexpr int most_blocks = 8;             // of substeps, after each of which there is damping and plastic flow
+constexpr int damped_blocks = 2;           // where bodies touch, of damping: an impact lasts no longer
 constexpr Real retry_growth = 1.5;         // substeps of a repeated step
 constexpr int most_sweeps = 50;            // of a substep; they end when one changes speeds by less than
 constexpr Real rigid_tolerance = 1e-3;     // this share of the first, between rigid bodies,
@@ -78,9 +78,11 @@ class SubCycle {
 
   /// Returns how many substeps it took: `substeps`, rounded up to whole blocks.
   int run(int substeps) {
-    const int dampings = !damps_ ? 0 : has_contacts_ ? std::min(damped_blocks, substeps) : 1;
+    // Seen once in a half period and always at rest, a mode is not damped: the fewer substeps between, the fewer such.
+    const int most = std::clamp(substeps / 4, 1, most_blocks);
+    const int dampings = !damps_ ? 0 : has_contacts_ ? std::min(damped_blocks, substeps) : most;
     int blocks = std::max(dampings, 1);
-    if (evolves_) blocks *= std::max(std::clamp(substeps / 4, 1, most_blocks) / blocks, 1);
+    if (evolves_) blocks *= std::max(most / blocks, 1);
     const int per_block = (substeps + blocks - 1) / blocks;
     const Real h = duration_ / (blocks * per_block);
     outside_work_ = since_contacts_ = 0;
