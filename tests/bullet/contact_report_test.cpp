@@ -3,13 +3,8 @@
 
 #include <algorithm>
 #include <numbers>
-#include <stdexcept>
-#include <utility>
 
-#include "bullet/simulation.h"
-#include "penalty/kinds/bending_angle.h"
-#include "penalty/kinds/length.h"
-#include "penalty/mesh/surface_builders.h"
+#include "bullet/contact_report.h"
 
 namespace penalty::testing {
 namespace {
@@ -27,32 +22,6 @@ Real mass_of(const Particles& particles) {
   for (const Real inverse_mass : particles.inverse_masses) mass += 1 / inverse_mass;
   return mass;
 }
-
-class ContactReport : public WorldTest {
- protected:
-  std::span<const BodyContact> contacts(const btSoftBody& body) { return sim.penalty().contacts(body); }
-  const Particles& particles(const btSoftBody& body) { return sim.penalty().particles(body); }
-
-  btSoftBody& add_box(const Vector3& at, Real size = 0.5) {
-    return sim.add_jelly(make_box({size, size, size}, {4, 4, 4}),
-                         {.shift = at, .attach = {.step = {.damping_time = 0.05}}});
-  }
-
-  btSoftBody& add_cloth(Real size, Real margin) {
-    TriangleSurface sheet = make_sheet(size, size, 8, 8);
-    btSoftBody& body = sim.add(make_soft_body(sim.info(), sheet, {.mass = 0.2, .margin = margin}));
-    PotentialField field(sheet.vertices);
-    field.add<Length>(edges_of(std::span<const Triangle>(sheet.triangles)), 1);
-    field.add<BendingAngle>(hinges_of(sheet.triangles), 1e-5);
-    sim.penalty().attach(body, std::move(field));
-    return body;
-  }
-
-  void throw_at(btSoftBody& body, const Vector3& velocity) {
-    for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_v = to_bullet(velocity);
-    sim.penalty().synchronize(body);
-  }
-};
 
 // Frames are averaged, as what lies on the other still rings by a thousandth of its weight.
 TEST_P(ContactReport, OfABoxOnJellyOnTheGroundIsTheirWeights) {
@@ -319,111 +288,6 @@ TEST_P(ContactReport, OfABodyInTheAirIsEmptyAndSoItIsOfOneThatIsHeld) {
   EXPECT_TRUE(contacts(jelly).empty()) << "no step was made";
   EXPECT_THROW(contacts(*make_soft_body(sim.info(), make_box({1, 1, 1}, {1, 1, 1}), SoftBodyOptions{})),
                std::invalid_argument);
-}
-
-TEST_P(ContactReport, TellsWhenContactBeginsAndEnds) {
-  sim.set_gravity({0, -g, 0});
-  btRigidBody& ground = sim.add_ground();
-  btSoftBody& jelly = add_box({0, 0.5, 0}, 0.2);
-  std::vector<int> counts;
-  int begun = 0, ended = 0;
-  sim.penalty().set_contact_callback([&](const btSoftBody& body, std::span<const BodyContact> contacts) {
-    EXPECT_EQ(&body, &jelly);
-    EXPECT_EQ(contacts.size(), sim.penalty().contacts(jelly).size());
-    begun += !contacts.empty() && contacts.front().is_new;
-    ended += contacts.empty();
-    for (const BodyContact& contact : contacts) EXPECT_EQ(contact.object, &ground);
-  });
-  sim.step(frame, 10);
-  EXPECT_EQ(begun, 0) << "it falls";
-  sim.step(frame, 60);
-  EXPECT_GE(begun, 1);
-  EXPECT_EQ(ended, begun - 1) << "it has come to lie";
-  throw_at(jelly, {0, 2, 0});
-  sim.step(frame, 5);
-  EXPECT_EQ(ended, begun);
-  sim.penalty().set_contact_callback({});
-  sim.step(frame, 60);
-  EXPECT_EQ(ended, begun);
-}
-
-TEST_P(ContactReport, WhatTheCallbackThrowsGoesNoFurtherThanTheReport) {
-  sim.set_gravity({0, -g, 0});
-  sim.add_ground();
-  btSoftBody& jelly = add_box({0, 0.0199, 0});
-  btSoftBody& other = add_box({2, 0.0199, 0});
-  sim.penalty().set_contact_callback([&](const btSoftBody& body, std::span<const BodyContact>) {
-    if (&body == &jelly) throw std::runtime_error("a game that is over");
-    throw 1;
-  });
-  sim.step(frame, 5);
-  EXPECT_EQ(sim.penalty().report(jelly).problem, "the contact callback threw: a game that is over");
-  EXPECT_NE(sim.penalty().report(other).problem, "");
-  EXPECT_FALSE(contacts(jelly).empty()) << "stepped all the same";
-}
-
-TEST_P(ContactReport, TheCallbackMayTakeBodiesAway) {
-  sim.set_gravity({0, -g, 0});
-  btRigidBody* ground = &sim.add_ground();
-  std::vector<btSoftBody*> bodies(4);
-  for (int k = 0; k < 4; ++k) bodies[k] = &add_box({Real(k), 0.0199, 0});
-  int told = 0;
-  sim.penalty().set_contact_callback([&](const btSoftBody&, std::span<const BodyContact> contacts) {
-    ++told;
-    if (contacts.empty()) return;
-    const std::size_t size = contacts.size();
-    EXPECT_EQ(contacts.front().object, told == 1 ? ground : nullptr);
-    if (ground) sim.remove(*std::exchange(ground, nullptr));
-    for (btSoftBody* body : std::exchange(bodies, {bodies.back()}))
-      if (body != bodies.front()) sim.remove(*body);
-    EXPECT_EQ(contacts.size(), size);
-    EXPECT_GT(contacts.front().impulse.norm(), 0) << "still there to be read";
-    if (told == 2) sim.penalty().set_contact_callback({});
-  });
-  sim.step(frame, 5);
-  EXPECT_EQ(told, 2) << "the first, which took the ground and three bodies, itself among them, and the last";
-}
-
-// The jelly gives way and is led out, so what is below is measured at the end of the step.
-TEST_P(ContactReport, DepthIsThatOfNodesBelowARigidFaceAndItsMargin) {
-  for (const Real mass : {0.0, 10.0}) {
-    btSoftBody& jelly = add_box({0, 0, 0});
-    btRigidBody& box = sim.add_box({0.4, 0.2, 0.4}, mass, {0.25, 0.69, 0.25});
-    sim.step(frame);
-    const Real face = to_vector(box.getWorldTransform().getOrigin()).y() - 0.2;
-    const Real below = particles(jelly).positions.row(1).maxCoeff() - face;
-    EXPECT_GT(below, 1e-3) << "1 cm before the step";
-    EXPECT_NEAR(sim.penalty().report(jelly).contact_depth, below + 0.02, 1e-5) << mass << " kg";
-    sim.remove(box);
-    sim.remove(jelly);
-  }
-}
-
-TEST_P(ContactReport, DepthIsThatOfACornerBetweenTheNodesAndTheMargin) {
-  for (const Real mass : {0.0, 1.0})
-    for (const Real sunk : {0.01, 0.05}) {
-      btSoftBody& jelly = add_box({0, 0, 0});
-      btRigidBody& box = sim.add_box({0.03, 0.1, 0.03}, mass, {0.28, 0.6 - sunk, 0.27});
-      sim.step(frame);
-      EXPECT_NEAR(sim.penalty().report(jelly).contact_depth, sunk + 0.02, 1e-3) << mass << " kg, " << sunk << " m";
-      sim.remove(box);
-      sim.remove(jelly);
-    }
-}
-
-TEST_P(ContactReport, DepthOfSoftBodiesThatPierceEachOther) {
-  btSoftBody& left = add_box({0, 0, 0});
-  add_box({0.48, 0.11, 0.09}, 0.3);
-  sim.step(frame);
-  EXPECT_NEAR(sim.penalty().report(left).contact_depth, 0.02 + 0.02, 0.008) << "2 cm, and margins of 2 cm";
-}
-
-TEST_P(ContactReport, DepthAtRestIsNone) {
-  sim.set_gravity({0, -g, 0});
-  sim.add_ground();
-  btSoftBody& jelly = add_box({0, 0.02, 0});
-  sim.step(frame, 120);
-  EXPECT_LT(sim.penalty().report(jelly).contact_depth, 2e-4);
 }
 
 // Sizes at which margins, weights and substeps are others; on the left a light one that carries a heavy one.
