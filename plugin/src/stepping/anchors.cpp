@@ -247,7 +247,7 @@ void Anchors::end(Real since) {
       outside_work_ += row.impulse.dot(relative) - driving_work(*point.point, row.impulse, point.body->particles);
       if (row.slot < 0) outside_work_ += row.impulse.dot(island_.rigid_bodies[row.rigid].velocity_at(row.arm));
       point.body->step_flows.contact_loss += row.impulse.dot(relative - row.start) / 2;
-      row.force = since > 0 ? Vector3(row.impulse / since) : Vector3::Zero();
+      if (since > 0) row.force = row.impulse / since;
     }
 }
 
