@@ -1,5 +1,6 @@
 // Kelvin-Voigt damping in the step: a mode of frequency w decays at beta w²/2, whatever the mesh and the substeps.
 #include <Eigen/Eigenvalues>
+#include <numbers>
 
 #include "stepping/surface_bodies.h"
 
@@ -85,6 +86,21 @@ INSTANTIATE_TEST_SUITE_P(All, BarDamping,
                          ::testing::Values(Bar{"clamped", true, ElasticModel::springs_volumes},
                                            Bar{"free", false, ElasticModel::springs_volumes}),
                          [](const auto& bar) { return bar.param.name; });
+
+TEST(Damping, BeyondWhatAStepCanGiveSaysHowMuchThereWas) {
+  const auto share = [](Real damping_time) {
+    Body bar = make_beam_body(1);
+    bar.body.options.damping_time = damping_time;
+    bar.set_velocity(0, {0.1, 0, 0});
+    advance(bar, 1.0 / 60);
+    return bar.body.report.damping_share;
+  };
+  EXPECT_EQ(share(0), 1);
+  EXPECT_EQ(share(0.02), 1);
+  const Real of_much = share(1e4), of_more = share(2e4);
+  EXPECT_LT(of_much, 0.5);
+  EXPECT_NEAR(of_more, of_much / 2, 1e-3 * of_much);
+}
 
 TEST(Damping, OfElementsMayBeSetLater) {
   Body bar = make_beam_body(1);
@@ -175,7 +191,7 @@ TEST(Settling, LeavesWhatSlidesAlone) {
   // Down a slope of 3 degrees without friction, in its frame.
   SurfaceBodies bodies = standing(1, 0.02);
   bodies.friction = 0;
-  const Real slope = 3 * M_PI / 180;
+  const Real slope = 3 * std::numbers::pi / 180;
   bodies.gravity = 9.81 * Vector3(std::sin(slope), -std::cos(slope), 0);
   Body& cube = bodies.add(make_box({1, 1, 1}, {3, 3, 3}), 100, 10, {.shift = {0, 0.005, 0}});
   bodies.step(1.0 / 60, 120);

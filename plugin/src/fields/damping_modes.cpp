@@ -4,8 +4,6 @@
 #include <map>
 #include <utility>
 
-#include "penalty/math/triple.h"
-
 namespace penalty {
 namespace {
 
@@ -44,22 +42,6 @@ template <int N>
     }
     quadruple(out + last) -= sum;
   }
-}
-
-// Compiled twice, as the loop over the forces is.
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-void add_pair_products(const std::array<int, 2>* stencils, const Real* weights, const std::array<Real, 4>* gradients,
-                       std::size_t size, const Real* v, Real* out) {
-  add_products<2>(stencils, weights, gradients, size, v, out);
-}
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-void add_quadruple_products(const std::array<int, 4>* stencils, const Real* weights,
-                            const std::array<Real, 12>* gradients, std::size_t size, const Real* v, Real* out) {
-  add_products<4>(stencils, weights, gradients, size, v, out);
 }
 
 template <int N>
@@ -143,13 +125,21 @@ void DampingModes::end() {
   }
 }
 
-void DampingModes::add_product(const Vectors& v, Forces out) const {
-  add_pair_products(pairs_.stencils.data(), pairs_.weights.data(), pairs_.gradients.data(), pairs_.stencils.size(),
-                    v.data(), out.data());
+// Compiled twice, as the loop over the forces is.
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+[[gnu::target_clones("arch=x86-64-v3", "default")]]
+#endif
+void DampingModes::add_products_of_few(const Real* v, Real* out) const {
+  add_products<2>(pairs_.stencils.data(), pairs_.weights.data(), pairs_.gradients.data(), pairs_.stencils.size(), v,
+                  out);
   add_products<3>(triples_.stencils.data(), triples_.weights.data(), triples_.gradients.data(),
-                  triples_.stencils.size(), v.data(), out.data());
-  add_quadruple_products(quadruples_.stencils.data(), quadruples_.weights.data(), quadruples_.gradients.data(),
-                         quadruples_.stencils.size(), v.data(), out.data());
+                  triples_.stencils.size(), v, out);
+  add_products<4>(quadruples_.stencils.data(), quadruples_.weights.data(), quadruples_.gradients.data(),
+                  quadruples_.stencils.size(), v, out);
+}
+
+void DampingModes::add_product(const Vectors& v, Forces out) const {
+  add_products_of_few(v.data(), out.data());
   for (std::size_t k = 0; k < others_.weights.size(); ++k) {
     Real rate = 0;
     for (std::size_t i = others_.begins[k]; i < others_.begins[k + 1]; ++i)

@@ -143,9 +143,7 @@ void ElementBatch::set_damping_time(int element, Real time) {
   const std::size_t e = check(element);
   if (!(time >= 0) || !std::isfinite(time))
     fail(e, "damping time is " + to_text(time) + " s, must be zero or positive");
-  Real& own = full(damping_times_, num_elements())[e];
-  if (time > own) ++stiffness_version_;
-  own = time;
+  full(damping_times_, num_elements())[e] = time;
   damps_ = true;
 }
 

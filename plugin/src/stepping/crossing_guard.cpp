@@ -25,7 +25,7 @@ Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edge
 
 void SurfaceContacts::guard(Real h, Real remaining, const RigidSweep& rigid_sweep) {
   zone_.clear();
-  if (is_beyond_help()) return;
+  if (is_empty() || is_beyond_help()) return;
   bool collected = true;
   for (int round = 0;; ++round) {
     if (refresh(h, remaining)) collected = false;

@@ -10,8 +10,9 @@ namespace {
 
 constexpr int most_stages = 200;
 constexpr int most_tries = 5;
-constexpr Real near_rest = 1.02;                        // growth of the bound that is none;
-constexpr Real safety_at_rest = 1.05, safety = 1.35;    // of the largest eigenvalue then, and else times the growth
+constexpr Real near_rest = 1.02;  // growth of the bound that is none;
+constexpr Real safety_at_rest = 1.05,
+               safety = 1.35;  // factors of the largest eigenvalue then, and else besides the growth
 constexpr Real damping_parameter = 1.3169578969248166;  // d = arcosh 2
 
 // The largest z of |R_s(z)| <= 1/2.
@@ -26,20 +27,18 @@ int stages_to_reach(Real z) {
   return std::min(stages, most_stages);
 }
 
-Real kinetic_energy(const PackedVectors& velocities, const Particles& particles) {
-  Real sum = 0;
-  for (int i = 0; i < particles.size(); ++i)
-    if (particles.inverse_masses[i] > 0) sum += velocities.col(i).squaredNorm() / particles.inverse_masses[i];
-  return sum / 2;
-}
-
 }  // namespace
 
-void Damper::set_modes(const PotentialField& field, const Positions& x, Real damping_time, Real duration) {
-  modes_.begin();
-  for (std::size_t k = 0; k < acting_.size(); ++k)
-    if (acting_[k]) field.potentials()[k]->add_damping_modes(x, damping_time, duration, modes_);
-  modes_.end();
+bool Damper::has_modes(const PotentialField& field, std::size_t potential) const {
+  return field.acts(potential) && field.potentials()[potential]->has_damping_modes();
+}
+
+void Damper::add_modes(const PotentialField& field, const Positions& x, Real damping_time, Real duration,
+                       DampingModes& modes) const {
+  modes.begin();
+  for (std::size_t k = 0; k < field.potentials().size(); ++k)
+    if (has_modes(field, k)) field.potentials()[k]->add_damping_modes(x, damping_time, duration, modes);
+  modes.end();
 }
 
 Real Damper::row_bound(const Particles& particles) {
@@ -52,20 +51,20 @@ Real Damper::row_bound(const Particles& particles) {
 }
 
 void Damper::prepare(const PotentialField& field, Real damping_time, const Particles& particles) {
-  bool same = is_prepared_ && damping_time == damping_time_ && field.stiffness_version() == stiffness_version_ &&
-              acting_.size() == field.potentials().size();
-  for (std::size_t k = 0; same && k < acting_.size(); ++k)
-    same = acting_[k] == (field.acts(k) && field.potentials()[k]->has_damping_modes());
+  const std::size_t size = field.potentials().size();
+  // Damping times of elements may have changed: the growth shows that, unless none damped.
+  bool same = is_prepared_ && rest_bound_ > 0 && damping_time == damping_time_ &&
+              field.stiffness_version() == stiffness_version_ && had_modes_.size() == size;
+  had_modes_.resize(size);
+  for (std::size_t k = 0; k < size; ++k)
+    if (had_modes_[k] != has_modes(field, k)) {
+      had_modes_[k] = !had_modes_[k];
+      same = false;
+    }
   if (same) return;
-  acting_.resize(field.potentials().size());
-  for (std::size_t k = 0; k < acting_.size(); ++k)
-    acting_[k] = field.acts(k) && field.potentials()[k]->has_damping_modes();
-  const PackedVectors& rest = field.rest_positions();
-  modes_ = DampingModes::with_pattern([&](DampingModes& modes) {
-    for (std::size_t k = 0; k < acting_.size(); ++k)
-      if (acting_[k]) field.potentials()[k]->add_damping_modes(rest, damping_time, 1, modes);
-  });
-  set_modes(field, rest, damping_time, 1);
+  const auto walk = [&](DampingModes& modes) { add_modes(field, field.rest_positions(), damping_time, 1, modes); };
+  modes_ = DampingModes::with_pattern(walk);
+  walk(modes_);
   rest_bound_ = row_bound(particles);
   rest_eigenvalue_ = largest_eigenvalue_bound([this](const Vectors& in, Forces out) { modes_.add_product(in, out); },
                                               rest_bound_, particles.inverse_masses);
@@ -107,31 +106,32 @@ void Damper::run_stages(int stages, Real share, const Particles& particles) {
 
 Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real duration, bool are_driven,
                             Particles& particles) {
-  const Real kinetic = penalty::kinetic_energy(particles);
+  const Real kinetic = kinetic_energy(particles);
+  if (!(kinetic > 0) || !std::isfinite(kinetic)) return {};
   Damped damped;
   prepare(field, damping_time, particles);
-  if (rest_bound_ > 0 && std::isfinite(kinetic)) {
-    set_modes(field, particles.positions, damping_time, duration);
+  if (rest_bound_ > 0) {
+    add_modes(field, particles.positions, damping_time, duration, modes_);
     if (growth_ == 0) growth_ = row_bound(particles) / (duration * rest_bound_);
     const Real largest =
         std::min(duration * rest_eigenvalue_ * (growth_ <= near_rest ? safety_at_rest : safety * growth_), 1e300);
     int stages = stages_to_reach(largest);
-    damped.share = std::min<Real>(reach(stages) / largest, 1);
-    for (int tries = 0; tries < most_tries; ++tries) {
-      run_stages(stages, damped.share, particles);
-      damped.stages += stages;
-      if (are_driven || kinetic_energy(now_, particles) <= kinetic * (1 + 1e-12)) {
+    const Real share = std::min<Real>(reach(stages) / largest, 1);
+    damped.share = 0;
+    for (int tries = 0; tries < most_tries && damped.share == 0; ++tries) {
+      run_stages(stages, share, particles);
+      if (are_driven || kinetic_energy(now_, particles.inverse_masses) <= kinetic * (1 + 1e-12)) {
         particles.velocities = now_;  // not swapped: contacts point into it
-        break;
+        damped.share = share;
       }
       stages = stages + stages / 2 + 1;
     }
   }
-  for (std::size_t k = 0; k < acting_.size(); ++k)
-    if (field.acts(k) && !acting_[k])
+  for (std::size_t k = 0; k < field.potentials().size(); ++k)
+    if (field.acts(k) && !field.potentials()[k]->has_damping_modes())
       field.potentials()[k]->dissipate(particles.positions, particles.inverse_masses, damping_time, duration,
                                        particles.velocities);
-  damped.lost = kinetic - penalty::kinetic_energy(particles);
+  damped.lost = kinetic - kinetic_energy(particles);
   return damped;
 }
 

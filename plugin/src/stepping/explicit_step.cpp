@@ -93,6 +93,7 @@ class SubCycle {
     for (SteppedBody* body : island_.bodies) {
       body->step_flows = {};
       body->is_pushed = false;
+      body->report.damping_share = 1;
       body->damper.begin_step();
     }
     island_.is_held_up = false;
@@ -105,7 +106,8 @@ class SubCycle {
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
       // Of a velocity that contacts have not seen there is nothing to damp, and nothing is handed out.
-      if (has_contacts_) solve_contacts(0, h, [&] { close(h); });
+      if (has_contacts_)
+        solve_contacts(0, h, [&] { surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); }); });
       if (evolves_) evolve(duration_ / blocks);
       const bool damps_now = dampings > 0 && (block + 1) % (blocks / dampings) == 0;
       const bool settles_now = island_.is_held_up && block + 1 == blocks;
@@ -113,7 +115,8 @@ class SubCycle {
       if (settles_now)
         for (SteppedBody* body : island_.bodies)
           if (body->is_pushed) settle(*body, duration_);
-      if (has_contacts_ && (damps_now || settles_now)) solve_contacts(0, h, [&] { close_again(h); });
+      if (has_contacts_ && (damps_now || settles_now))
+        solve_contacts(0, h, [&] { surfaces_.close_again(h, [this, h] { return sweep(h); }); });
     }
     return blocks * per_block;
   }
@@ -128,10 +131,7 @@ class SubCycle {
     if (has_contacts_) {
       for (SteppedBody* body : island_.bodies) kick(*body, kick_time);
       // Since the last drift there was a whole kick, be it in halves.
-      if (surfaces_.is_empty())
-        solve_contacts(h, h, [&] { converge(h); });
-      else
-        solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, since_contacts_, [this, h] { return sweep(h); }); });
+      solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, since_contacts_, [this, h] { return sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
     } else {
       for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
@@ -154,11 +154,6 @@ class SubCycle {
     if (sweeps_ == 0) first_change_ = change;
     return ++sweeps_ < most_sweeps && change > negligible * rigid_contacts_.acceleration() * h &&
            (of_rigid > rigid_tolerance * first_change_ || of_particles > particle_tolerance * first_change_);
-  }
-
-  void converge(Real h) {
-    while (sweep(h)) {
-    }
   }
 
   // Books what contacts, by whatever sweeps, made of the velocities. A kick and the contacts after it are one change of
@@ -200,19 +195,6 @@ class SubCycle {
     for (const Coupling* coupling : island_.couplings) kick(*coupling, island_, time);
   }
 
-  void close(Real h) {
-    if (surfaces_.is_empty())
-      converge(h);
-    else
-      surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); });
-  }
-  void close_again(Real h) {
-    if (surfaces_.is_empty())
-      converge(h);
-    else
-      surfaces_.close_again(h, [this, h] { return sweep(h); });
-  }
-
   // Plastic flow and breaking.
   void evolve(Real duration) {
     for (SteppedBody* body : island_.bodies) {
@@ -232,6 +214,7 @@ class SubCycle {
       const Damper::Damped damped =
           body->damper.damp(*body->field, body->options.damping_time, duration, has_driven_particles_, body->particles);
       body->step_flows.damping += damped.lost;
+      body->report.damping_share = std::min(body->report.damping_share, damped.share);
       if (has_driven_particles_) outside_work_ -= damped.lost;  // what drives them may give energy through the damping
     }
     for (Coupling* coupling : island_.couplings)

@@ -38,6 +38,7 @@ StepReport report_of(const Island& island) {
     sum.unfolded = sum.unfolded || report.unfolded;
     sum.retries = std::max(sum.retries, report.retries);
     sum.finite = sum.finite && report.finite;
+    sum.damping_share = std::min(sum.damping_share, report.damping_share);
     sum.elastic_energy += report.elastic_energy;
     sum.kinetic_energy += report.kinetic_energy;
     sum.contact_depth = std::max(sum.contact_depth, report.contact_depth);

@@ -3,10 +3,14 @@
 namespace penalty {
 
 Real kinetic_energy(const Particles& particles) {
+  return kinetic_energy(particles.velocities, particles.inverse_masses);
+}
+
+Real kinetic_energy(const Vectors& velocities, std::span<const Real> inverse_masses) {
   Real sum = 0;
-  for (int i = 0; i < particles.size(); ++i)
-    if (particles.inverse_masses[i] > 0)
-      sum += particles.velocities.col(i).head<3>().squaredNorm() / particles.inverse_masses[i];
+  for (std::size_t i = 0; i < inverse_masses.size(); ++i)
+    if (inverse_masses[i] > 0)
+      sum += velocities.col(static_cast<Eigen::Index>(i)).head<3>().squaredNorm() / inverse_masses[i];
   return sum / 2;
 }
 

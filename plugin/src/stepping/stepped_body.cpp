@@ -64,7 +64,7 @@ void undo_step(SteppedBody& body) {
 }
 
 void settle(SteppedBody& body, Real duration) {
-  constexpr Real settling_rate = 6;  // of the slowest motion, relative to sqrt(g / size)
+  constexpr Real settling_rate = 6;  // in sqrt(g / size), of motion that is almost none
   const Real gravity = body.gravity.norm();
   const Real fastest = body.options.settling_speed * std::sqrt(gravity * body.size);
   if (!(fastest > 0) || !(body.mass > 0)) return;

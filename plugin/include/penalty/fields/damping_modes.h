@@ -32,7 +32,7 @@ class DampingModes {
   /// A mode of these points; `cancels`: its gradients add up to zero.
   void count(std::span<const int> stencil, bool cancels);
 
-  /// All modes are zero, and the next to be added is the first again.
+  /// The next mode to be added is the first again.
   void begin();
   /// The next mode is weight * g gᵀ; one column of g a point of the stencil that was counted.
   template <class Columns>
@@ -103,6 +103,7 @@ class DampingModes {
   }
 
   void end_counting();
+  void add_products_of_few(const Real* v, Real* out) const;
 
   std::vector<Place> places_;  // of each mode, in the order of the walk
   std::size_t next_ = 0;

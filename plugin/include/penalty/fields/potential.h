@@ -97,7 +97,7 @@ class Potential {
   bool has_damping_modes() const { return has_damping_modes_; }
   bool evolves() const { return evolves_; }  // `evolve` may have something to do
 
-  /// Grows with every change that may raise stiffness or damping: what was estimated from it is then out of date.
+  /// Grows with every change that may raise the stiffness: what was estimated from it is then out of date.
   std::uint64_t stiffness_version() const { return stiffness_version_; }
 
  protected:

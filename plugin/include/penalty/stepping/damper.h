@@ -13,14 +13,13 @@ namespace penalty {
 ///     R_s(z) = T_s(w0 - w1 z) / T_s(w0),   w0 = cosh(d / s),  w1 = sinh(d / s) / (s tanh(d)),  cosh d = 2
 ///
 /// takes s products with D and no solution, has the slope -1 at z = 0 whatever s is, so that slow modes decay as they
-/// should, and |R_s| <= 1 up to z of about 1.3 s², where the fastest mode is to lie. Each stage adds impulses of elements:
-/// momenta stay what they are.
+/// should, and |R_s| <= 1 up to z of about 1.3 s², where the fastest mode is to lie. Each stage adds impulses of
+/// elements: momenta stay what they are.
 class Damper {
  public:
   struct Damped {
     Real lost = 0;   // kinetic energy [J]
-    int stages = 0;  // products with D
-    Real share = 1;  // of D that the most stages allowed
+    Real share = 1;  // of D that the most stages allowed; 0 where it had grown too stiff for all that were tried
   };
 
   /// `damping_time` as in Potential::add_damping [s]. Pinned particles keep their velocity; `are_driven`: some of them
@@ -35,13 +34,15 @@ class Damper {
 
  private:
   void prepare(const PotentialField& field, Real damping_time, const Particles& particles);
-  void set_modes(const PotentialField& field, const Positions& x, Real damping_time, Real duration);
+  bool has_modes(const PotentialField& field, std::size_t potential) const;
+  void add_modes(const PotentialField& field, const Positions& x, Real damping_time, Real duration,
+                 DampingModes& modes) const;
   Real row_bound(const Particles& particles);
   void run_stages(int stages, Real share, const Particles& particles);
 
   bool is_prepared_ = false;
   std::uint64_t stiffness_version_ = 0;
-  std::vector<bool> acting_;
+  std::vector<bool> had_modes_;  // each potential, and acted
   Real damping_time_ = 0;
   Real rest_eigenvalue_ = 0, rest_bound_ = 0;  // of M^-1 D at rest [1/s]
   Real growth_ = 0;                            // of the latter since then; 0: not measured

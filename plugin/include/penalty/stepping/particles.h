@@ -1,5 +1,6 @@
 // The moving state of a body.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "penalty/math/types.h"
@@ -17,6 +18,7 @@ struct Particles {
 };
 
 Real kinetic_energy(const Particles& particles);                                         // [J]
+Real kinetic_energy(const Vectors& velocities, std::span<const Real> inverse_masses);    // [J]
 Vector3 linear_momentum(const Particles& particles);                                     // [kg m/s]
 Vector3 angular_momentum(const Particles& particles, const Vector3& about = {0, 0, 0});  // [kg m²/s]
 

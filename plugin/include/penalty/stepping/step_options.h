@@ -23,19 +23,19 @@ struct LinearOptions {
   void check(const char* what) const;
 };
 
-/// How a body is stepped. Nothing damps by default but `settling_speed`, and that only what lies still; `damping_time` and
-/// `drag` do. (Far from rest the energy guard still
-/// takes a little: it repeats steps that gain energy, not those that lose it.)
+/// How a body is stepped. By default only `settling_speed` damps, and that only what lies almost still. (Far from rest the
+/// energy guard still takes a little: it repeats steps that gain energy, not those that lose it.)
 struct StepOptions {
   Integrator integrator = Integrator::automatic;
-  Real damping_time = 0;  // ratio of damping to stiffness along the constraint gradients, beta [s]: a mode of
-                          // angular frequency w decays as exp(-beta w² t / 2)
-  Real drag = 0;          // rate at which all velocities decay [1/s]; does not keep momentum
-  Real settling_speed =
-      0.1;             // what lies on something that is at rest, and moves within itself slower than this share of
-                       // sqrt(g * size), comes to rest; 0: as it would
-  int substeps = 0;    // in a step; 0: from the stability limit; surfaces that meet fast take more
-  Real safety = 0.99;  // share of the stability limit that a substep may use, in (0, 1]
+  /// Ratio of damping to stiffness along the constraint gradients, beta [s]: a mode of angular frequency w decays as
+  /// exp(-beta w² t / 2).
+  Real damping_time = 0;
+  Real drag = 0;  // rate at which all velocities decay [1/s]; does not keep momentum
+  /// What lies on something that is at rest, and moves within itself slower than this share of sqrt(g * size), comes to
+  /// rest. 0: only by damping and friction.
+  Real settling_speed = 0.1;
+  int substeps = 0;               // in a step; 0: from the stability limit; surfaces that meet fast take more
+  Real safety = 0.99;             // share of the stability limit that a substep may use, in (0, 1]
   Real contact_safety = 0.7;      // the same while the body is in contact: impacts excite the fastest modes
   Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps
   int max_substeps = 20000;       // beyond this a step is taken as it is, if it is finite

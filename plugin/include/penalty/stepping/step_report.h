@@ -18,6 +18,7 @@ struct StepReport {
   int retries = 0;                                    // by the energy guard
   bool finite = true;                                 // false: the step was undone, the state is that of its start
   int first_bad_particle = -1;  // when not finite: the first such particle at the start, else the fastest
+  Real damping_share = 1;       // least share of the damping that was asked for, that an explicit step could give
   Real elastic_energy = 0;      // at the end [J]
   Real kinetic_energy = 0;      // at the end, without rigid bodies [J]
   /// Largest depth at the end [m], of a node below a plane that is a margin outside a rigid body, of what surfaces have
