@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 #include "penalty/mesh/surface_builders.h"
 #include "scenes/scene_setup.h"
@@ -64,12 +63,8 @@ class Stretch {
 };
 
 SceneSetup cape(const SceneOptions& options, const BodyMesh& body) {
-  if (options.poisson) throw std::invalid_argument("--poisson does not apply to cape: springs in a plane have 1/3");
   const Eigen::Matrix3Xd& rest = body.vertices();
-  Sheet sheet = woven;
-  if (options.young) sheet.young = *options.young;
-  PotentialField field = options.stiffness ? PotentialField(rest) : shell_field(body.shell(), sheet);
-  if (options.stiffness) field.add<Length>(body.edges(), *options.stiffness);
+  SceneCloth sheet = cloth_of("cape", options, body, woven);
 
   Eigen::Matrix3Xd hanging(3, rest.cols());
   std::vector<int> shoulders;
@@ -84,8 +79,8 @@ SceneSetup cape(const SceneOptions& options, const BodyMesh& body) {
   return {.name = "cape",
           .title = "A cape follows its wearer",
           .bodies = alone({.mesh = body,
-                           .field = std::move(field),
-                           .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
+                           .field = std::move(sheet.field),
+                           .mass = sheet.mass,
                            .positions = positions,
                            .pinned = shoulders,
                            .carrier = 0}),

@@ -30,14 +30,9 @@ BodyMesh cloth_body(const SceneOptions& options) {
 }
 
 SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
-  if (options.poisson) throw std::invalid_argument("--poisson does not apply to cloth: springs in a plane have 1/3");
   const Eigen::Matrix3Xd& rest = body.vertices();
   const auto num_vertices = static_cast<int>(rest.cols());
-  Sheet sheet = canvas;
-  if (options.young) sheet.young = *options.young;
-  PotentialField field = options.stiffness ? PotentialField(rest) : shell_field(body.shell(), sheet);
-  if (options.stiffness) field.add<Length>(body.edges(), *options.stiffness);
-  const Real mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell());
+  SceneCloth sheet = cloth_of("cloth", options, body, canvas);
 
   const int side = static_cast<int>(std::lround(std::sqrt(num_vertices)));
   const std::vector<int> corners{0, side - 1, num_vertices - side, num_vertices - 1};
@@ -59,8 +54,11 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
     balls.push_back({.shape = Ball{ball_radius}, .pose = {.position = {0.12, height + fall, 0.08}}, .mass = ball_mass});
   return {.name = "cloth",
           .title = "Cloth catches a ball",
-          .bodies =
-              alone({.mesh = body, .field = std::move(field), .mass = mass, .positions = positions, .pinned = corners}),
+          .bodies = alone({.mesh = body,
+                           .field = std::move(sheet.field),
+                           .mass = sheet.mass,
+                           .positions = positions,
+                           .pinned = corners}),
           .gravity = {0, -9.81, 0},
           .ground = true,
           .objects = balls,

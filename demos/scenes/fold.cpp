@@ -2,7 +2,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <stdexcept>
 
 #include "penalty/mesh/surface_builders.h"
 #include "scenes/drawn_surface.h"
@@ -42,12 +41,8 @@ Eigen::Matrix3Xd folded_over(const Eigen::Matrix3Xd& flat) {
 }
 
 SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
-  if (options.poisson) throw std::invalid_argument("--poisson does not apply to fold: springs in a plane have 1/3");
   const Eigen::Matrix3Xd& rest = body.vertices();
-  Sheet sheet = woven;
-  if (options.young) sheet.young = *options.young;
-  PotentialField field = options.stiffness ? PotentialField(rest) : shell_field(body.shell(), sheet);
-  if (options.stiffness) field.add<Length>(body.edges(), *options.stiffness);
+  SceneCloth sheet = cloth_of("fold", options, body, woven);
   const Start start = options.start.value_or(Start::rest);
   const Eigen::Matrix3Xd folded = folded_over(rest);
   const std::vector<Edge> edges = body.edges();
@@ -58,8 +53,8 @@ SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
   return {.name = "fold",
           .title = "Cloth falls folded on a ball",
           .bodies = alone({.mesh = body,
-                           .field = std::move(field),
-                           .mass = options.stiffness ? 1 : sheet.density * sheet.thickness * area(body.shell()),
+                           .field = std::move(sheet.field),
+                           .mass = sheet.mass,
                            .positions = start == Start::rest ? folded : start_positions(folded, start, options.seed)}),
           .gravity = {0, -9.81, 0},
           .ground = true,

@@ -1,5 +1,8 @@
 #include "scenes/shell.h"
 
+#include <stdexcept>
+#include <string>
+
 namespace penalty::demo {
 
 PotentialField shell_field(const TriangleSurface& surface, const Sheet& sheet) {
@@ -19,6 +22,17 @@ PotentialField shell_field(const TriangleSurface& surface, const Sheet& sheet) {
   }
   if (sheet.bending > 0) field.add<BendingAngle>(hinges, stiffnesses);
   return field;
+}
+
+SceneCloth cloth_of(std::string_view scene, const SceneOptions& options, const BodyMesh& body, Sheet sheet) {
+  if (options.poisson)
+    throw std::invalid_argument("--poisson does not apply to " + std::string(scene) + ": springs in a plane have 1/3");
+  if (options.young) sheet.young = *options.young;
+  if (!options.stiffness)
+    return {shell_field(body.shell(), sheet), sheet.density * sheet.thickness * area(body.shell())};
+  PotentialField springs(body.vertices());
+  springs.add<Length>(body.edges(), *options.stiffness);
+  return {std::move(springs), 1};
 }
 
 }  // namespace penalty::demo

@@ -1,7 +1,11 @@
 // Thin sheets from springs and hinges: cloth, the skin of a balloon, foil.
 #pragma once
+#include <string_view>
+
 #include "penalty/fields/potential_field.h"
 #include "penalty/mesh/triangle_surface.h"
+#include "scenes/body_mesh.h"
+#include "scenes/scene_options.h"
 
 namespace penalty::demo {
 
@@ -26,5 +30,13 @@ struct Sheet {
 /// Shells) and Bridson et al. 2003; bent to a cylinder of curvature c, a mesh of equal triangles, rectangular or
 /// equilateral, holds D c²/2 per area, as a plate with D = E h³ / 12 (1 - 1/9) does.
 PotentialField shell_field(const TriangleSurface& surface, const Sheet& sheet);
+
+/// The cloth of a scene: of `sheet`, with what --young says of it, or of bare springs where --stiffness is given. Throws
+/// std::invalid_argument for --poisson.
+struct SceneCloth {
+  PotentialField field;
+  Real mass;  // [kg]
+};
+SceneCloth cloth_of(std::string_view scene, const SceneOptions& options, const BodyMesh& body, Sheet sheet);
 
 }  // namespace penalty::demo
