@@ -21,9 +21,9 @@ PotentialField every_size_of_mode(Random& random) {
   std::vector<int> all(mesh.vertices.cols());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<Triangle> hull = boundary_faces(mesh.tetrahedra);
-  field.add(EnclosedVolume({hull.begin(), hull.end()}), std::span(&all, 1), {1.0});
+  field.add(EnclosedVolume({hull.begin(), hull.end()}), std::span(&all, 1), 1);
   const StencilOf<Distance> corner{0};
-  field.add(Distance::to(Vector3(-1, -2, -3)), std::span(&corner, 1), {4.0});
+  field.add(Distance::to(Vector3(-1, -2, -3)), std::span(&corner, 1), 4);
   return field;
 }
 
