@@ -7,8 +7,6 @@
 namespace penalty::testing {
 namespace {
 
-btScalar scalar(Real value) { return static_cast<btScalar>(value); }
-
 Real extent(const Eigen::Matrix3Xd& points) {
   return (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
 }
@@ -380,7 +378,7 @@ void Sequence::append_node() {
 
 void Sequence::change_margin() {
   Body* body = pick_body();
-  if (body) body->soft->getCollisionShape()->setMargin(scalar(chance_.number(0.001, 0.1)));
+  if (body) body->soft->getCollisionShape()->setMargin(static_cast<btScalar>(chance_.number(0.001, 0.1)));
 }
 
 void Sequence::change_gravity() {

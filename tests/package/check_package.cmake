@@ -64,7 +64,8 @@ elseif(STEP STREQUAL "find_package")
 elseif(STEP STREQUAL "build_tree")
   use_package(${BUILD})
 elseif(STEP STREQUAL "subproject")
-  # Part of a project of other habits, which fetches us and wants shared libraries; and the installation of those.
+  # Part of a project of other habits, which fetches us, wants shared libraries and compiles each from a single source; and
+  # the installation of those.
   list(GET PRECISIONS 0 PRECISIONS)  # the whole library is compiled again: one precision, and not optimised
   set(module bullet)
   set(target bullet_penalty)
@@ -90,6 +91,7 @@ elseif(STEP STREQUAL "subproject")
   file(WRITE ${scratch}/CMakeLists.txt
     "cmake_minimum_required(VERSION 3.22)\nproject(jelly_box LANGUAGES CXX)\n"
     "set(CMAKE_CXX_STANDARD 17)\nset(CMAKE_CXX_VISIBILITY_PRESET hidden)\n"
+    "set(CMAKE_UNITY_BUILD ON)\nset(CMAKE_UNITY_BUILD_BATCH_SIZE 0)\n"
     "include(FetchContent)\nFetchContent_Declare(BulletPenalty SOURCE_DIR ${SOURCE})\n"
     "FetchContent_MakeAvailable(BulletPenalty)\n"
     "if(CMAKE_BUILD_TYPE)\n  message(FATAL_ERROR \"BulletPenalty has chosen a build type for us\")\nendif()\n"

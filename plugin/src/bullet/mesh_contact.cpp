@@ -10,9 +10,9 @@ namespace penalty {
 namespace {
 
 constexpr Real same_distance = 1e-9;  // relative to what is measured
-constexpr Real flat = 1e-6;           // height over a plane that is none, relative to the size of the triangle
+constexpr Real flat_height = 1e-6;    // height over a plane that is none, relative to the size of the triangle
 constexpr int most_planes = 16;       // of a point and a mesh
-constexpr Real slop = 1e-4;           // depth that does not matter [m]
+constexpr Real mesh_slop = 1e-4;      // depth that does not matter [m]
 constexpr int bisections = 12;
 
 ClosestPoints closest(const MeshTriangle& triangle, const Vector3& point) {
@@ -64,7 +64,7 @@ Vector3 direction_to(const MeshTriangle& triangle, const Vector3& point, const V
 
 bool is_behind(const MeshTriangle& triangle, const SurfacePoint& plane, Real mesh_margin) {
   const Vector3 on_plane = plane.point - mesh_margin * plane.normal;
-  const Real allowed = flat * size_of(triangle);
+  const Real allowed = flat_height * size_of(triangle);
   return plane.normal.dot(triangle.a - on_plane) <= allowed && plane.normal.dot(triangle.b - on_plane) <= allowed &&
          plane.normal.dot(triangle.c - on_plane) <= allowed;
 }
@@ -130,8 +130,8 @@ void append_planes(std::vector<MeshTriangle>& triangles, const MovingPoint& poin
   for (const MeshTriangle& triangle : triangles) {
     if (found.size() - begin == most_planes) return;
     if (!is_left(triangle)) continue;
-    const Approach hit = approach_of(triangle, x, way, margin - slop);
-    if (hit.distance >= margin - slop && length < margin) continue;  // slow ones keep to the way that is foreseen
+    const Approach hit = approach_of(triangle, x, way, margin - mesh_slop);
+    if (hit.distance >= margin - mesh_slop && length < margin) continue;  // slow ones keep to the way that is foreseen
     const Vector3 surface = hit.position - hit.closest.difference;
     Vector3 normal = direction_to(triangle, hit.position, hit.closest.difference);
     // What it hits it will lie on, and the plane of the triangle is in nobody's way either where the point stays above
@@ -150,7 +150,7 @@ WayBack append_way_back(std::vector<MeshTriangle>& triangles, const Vector3& poi
   const Nearest nearest = nearest_of(triangles, point);
   if (!(nearest.distance <= radius)) return WayBack::too_far;
   const bool is_on_it = nearest.distance <= same_distance * (1 + size_of(*nearest.triangle));
-  if (!is_on_it && nearest.height < (1 - flat) * nearest.distance) {  // nearest on an edge or a vertex
+  if (!is_on_it && nearest.height < (1 - flat_height) * nearest.distance) {  // nearest on an edge or a vertex
     const auto& w = nearest.closest.weights;
     const bool is_vertex = (w[1] == 0) + (w[2] == 0) + (w[3] == 0) == 2;
     if (nearest.equally_near <= (is_vertex ? 2 : 1)) return WayBack::around_the_rim;

@@ -34,7 +34,7 @@ Box box_around(const Vector3& point, Real radius) {
 }
 
 // The pairs of particles that an element holds, each once.
-std::vector<Edge> edges_of(const MeshVisitor& body) {
+std::vector<Edge> mesh_edges(const MeshVisitor& body) {
   std::vector<Edge> edges;
   body.field.visit_elements(body.particles.positions, [&](const ElementView& element) {
     constexpr std::size_t most_points = 4;  // what holds more says nothing of who is next to whom
@@ -135,7 +135,7 @@ void MeshSides::Mesh::place(const MeshVisitor& body, const std::vector<Vector3>&
   Box box;
   for (const Vector3& x : particles) box.add(x);
   if (!box.overlaps(surface, 0)) return;
-  const std::vector<char> lesser = lesser_parts(body.particles.inverse_masses, edges_of(body), [&](const Edge& edge) {
+  const std::vector<char> lesser = lesser_parts(body.particles.inverse_masses, mesh_edges(body), [&](const Edge& edge) {
     Box way;
     for (const int particle : edge) way.add(particles[particle]);
     return way.overlaps(surface, 0) && is_passed(particles[edge[0]], particles[edge[1]]);

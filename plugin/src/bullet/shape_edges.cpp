@@ -25,9 +25,9 @@
 namespace penalty {
 namespace {
 
-constexpr int rim_sides = 24;    // of the polygon that stands for a circle
-constexpr int directions = 128;  // in which a convex shape of another kind is asked for its corners
-constexpr Real flat = 1e-4;      // sine of the angle between triangles whose edge is none
+constexpr int rim_sides = 24;     // of the polygon that stands for a circle
+constexpr int directions = 128;   // in which a convex shape of another kind is asked for its corners
+constexpr Real flat_edge = 1e-4;  // sine of the angle between triangles whose edge is none
 using List = std::vector<ShapeEdges>;
 
 ShapeEdges& of_radius(List& list, Real radius) {
@@ -154,7 +154,7 @@ class Creases final : public btTriangleCallback {
       const auto [low, high] = std::minmax(corner[k], corner[(k + 1) % 3]);
       const auto [edge, is_new] = edges_.try_emplace(Edge{low, high}, Side{face.normalized(), 1, true});
       if (is_new) continue;
-      edge->second.is_flat = edge->second.is_flat && edge->second.normal.cross(face.normalized()).norm() < flat;
+      edge->second.is_flat = edge->second.is_flat && edge->second.normal.cross(face.normalized()).norm() < flat_edge;
       ++edge->second.count;
     }
   }

@@ -9,7 +9,7 @@
 namespace penalty {
 namespace {
 
-constexpr Real share = 0.2;        // of the way to the anchor, that a drift takes back
+constexpr Real drift_share = 0.2;  // of the way to the anchor, that a drift takes back
 constexpr Real compliance = 1e-6;  // relative to that of the rigid bodies
 
 using Arm = Eigen::Matrix<Real, 3, 6>;
@@ -160,7 +160,7 @@ void Anchors::begin(Real h, Real since) {
       const RigidBody& rigid = island_.rigid_bodies[row.rigid];
       row.arm = x - rigid.position;
       row.start = relative_velocity(point, row);
-      Vector3 back = -share / h * (row.arm - rigid.rotation * row.anchor);
+      Vector3 back = -drift_share / h * (row.arm - rigid.rotation * row.anchor);
       if (const Real speed = back.norm(); speed > recovery_speed) back *= recovery_speed / speed;
       row.wanted = row.start + row.influence * (back - row.start);
       row.impulse.setZero();

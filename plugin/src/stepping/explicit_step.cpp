@@ -18,10 +18,10 @@ namespace {
 constexpr int most_blocks = 8;             // of substeps, after each of which there is damping and plastic flow
 constexpr int damped_blocks = 2;           // where bodies touch, of damping: an impact lasts no longer
 constexpr Real retry_growth = 1.5;         // substeps of a repeated step
-constexpr int most_sweeps = 50;            // of a substep; they end when one changes speeds by less than
+constexpr int most_island_sweeps = 50;     // of a substep; they end when one changes speeds by less than
 constexpr Real rigid_tolerance = 1e-3;     // this share of the first, between rigid bodies,
 constexpr Real particle_tolerance = 1e-2;  // this with soft ones,
-constexpr Real negligible = 0.2;           // or of what accelerations make of them
+constexpr Real negligible_change = 0.2;    // or of what accelerations make of them
 constexpr int fewest_on_held = 8;          // substeps where a rigid body may lie on points that are held
 constexpr Real substep_memory = 0.8;       // share of the last step's substeps that the next one starts from
 
@@ -152,7 +152,7 @@ class SubCycle {
     if (!are_coupled_) return false;
     const Real change = std::max(of_rigid, of_particles);
     if (sweeps_ == 0) first_change_ = change;
-    return ++sweeps_ < most_sweeps && change > negligible * rigid_contacts_.acceleration() * h &&
+    return ++sweeps_ < most_island_sweeps && change > negligible_change * rigid_contacts_.acceleration() * h &&
            (of_rigid > rigid_tolerance * first_change_ || of_particles > particle_tolerance * first_change_);
   }
 

@@ -10,10 +10,10 @@
 namespace penalty {
 namespace {
 
-constexpr int most_substeps = 16;     // of a step whose energy would grow
-constexpr Real growth_noise = 1e-12;  // relative growth of energy that is round-off
-constexpr Real round_off = 1e-12;     // of a sum of forces, relative to the sum of their magnitudes
-constexpr Real round_off2 = 1e-28;    // square of that of positions, relative to the size of the body
+constexpr int most_implicit_substeps = 16;  // of a step whose energy would grow
+constexpr Real growth_noise = 1e-12;        // relative growth of energy that is round-off
+constexpr Real sum_round_off = 1e-12;       // of a sum of forces, relative to the sum of their magnitudes
+constexpr Real round_off2 = 1e-28;          // square of that of positions, relative to the size of the body
 
 /// Mass, centre, momenta and inertia of particles that nothing holds.
 struct RigidState {
@@ -161,8 +161,8 @@ void ImplicitStep::restore_momenta(const RigidState& before) {
     forces += f.norm();
     torques += arm.norm() * f.norm();
   }
-  if (force.norm() < round_off * forces) force.setZero();
-  if (torque.norm() < round_off * torques) torque.setZero();
+  if (force.norm() < sum_round_off * forces) force.setZero();
+  if (torque.norm() < sum_round_off * torques) torque.setZero();
   Vector3 momentum = before.momentum + duration_ * (before.mass * body_.gravity + force);
   Vector3 spin = before.spin + duration_ * torque;
   if (body_.external_forces.size() != 0)
@@ -256,8 +256,8 @@ void advance_implicitly(SteppedBody& body, Real duration) {
                    .allowed = allowed,
                    .noise = tolerance * std::max(start_energy, end_energy) + body.energy_noise};
   };
-  const GuardedStep step =
-      guard_energy(1, start_energy, {.most_substeps = most_substeps, .factor = 2}, attempt, [&] { undo_step(body); });
+  const GuardedStep step = guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2},
+                                        attempt, [&] { undo_step(body); });
   report.substeps = step.attempt.substeps;
   report.retries = step.retries;
   report.finite = step.finite;

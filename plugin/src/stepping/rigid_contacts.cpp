@@ -7,8 +7,8 @@
 namespace penalty {
 namespace {
 
-constexpr Real slop = 1e-4;  // depth that may stay [m]
-constexpr Real impact = 4;   // approach, relative to what accelerations make of rest, whose impulse does not come again
+constexpr Real rigid_slop = 1e-4;  // depth that may stay [m]
+constexpr Real impact = 4;  // approach, relative to what accelerations make of rest, whose impulse does not come again
 constexpr Real restitution_threshold = 0.2;  // approach that is an impact [m/s]: Bullet's
 
 }  // namespace
@@ -35,7 +35,7 @@ void RigidContacts::begin(Real h, Real since) {
     row.mobility = a.mobility_at(row.arm_a) + b.mobility_at(row.arm_b);
     row.normal_mobility = row.normal.dot(row.mobility * row.normal);
     const Real gap = row.normal.dot(at_a - at_b), speed = row.normal.dot(relative_velocity(row));
-    row.recovery = std::clamp<Real>((-gap - slop) / std::max(recovery_time, h), 0, recovery_speed);
+    row.recovery = std::clamp<Real>((-gap - rigid_slop) / std::max(recovery_time, h), 0, recovery_speed);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
     row.is_impact = -speed > impact * acceleration_ * since;
     if (-speed > restitution_threshold && -speed * h > gap)

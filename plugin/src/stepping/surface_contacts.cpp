@@ -14,12 +14,12 @@ constexpr Real exit_acceleration = 20;      // likewise [m/s²]: what is pressed
 constexpr Real slop = 0.02;                 // share of the thickness that may be lost
 constexpr Real step_share = 0.5;            // of the thickness that a substep may bring surfaces closer
 constexpr Real common_direction = 0.2;      // share of the depths that must agree where enclosed points are led out
-constexpr int most_substeps = 400;          // to that end; beyond it the guard has more to do
+constexpr int most_near_substeps = 400;     // to that end; beyond it the guard has more to do
 constexpr int fewest_substeps = 16;         // of a step in which surfaces are near
-constexpr int most_sweeps = 50;
+constexpr int most_surface_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
-constexpr Real negligible = 3e-4;         // unless it is this small
+constexpr Real negligible_share = 3e-4;   // unless it is this small
 
 }  // namespace
 
@@ -76,7 +76,8 @@ void SurfaceContacts::begin_step(Real duration) {
       for (const int body : {contact.body_a, contact.body_b})
         if (body >= 0) may_touch_[body] = true;
     if (closing > 0 && pair.thickness() > 0)
-      needed = std::max(needed, std::min<Real>(std::ceil(closing / (step_share * pair.thickness())), most_substeps));
+      needed =
+          std::max(needed, std::min<Real>(std::ceil(closing / (step_share * pair.thickness())), most_near_substeps));
   }
   least_substeps_ = static_cast<int>(needed);
   for (const SurfaceContact& surface : island_.surfaces)
@@ -286,7 +287,7 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
   bool changed = false;
   Real first = 0;
   start(since);
-  for (int sweep = 0; sweep < most_sweeps && !scratch_.pairs.empty(); ++sweep) {
+  for (int sweep = 0; sweep < most_surface_sweeps && !scratch_.pairs.empty(); ++sweep) {
     const bool again = rigid_sweep();
     bool hit = false;
     const Real worst = sweep_pairs(h, hit);
@@ -294,9 +295,9 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
     if (again) continue;
     if (!hit) break;
     if (first == 0) first = worst;
-    if (worst < tolerance && (worst < relative_tolerance * first || worst < negligible)) break;
+    if (worst < tolerance && (worst < relative_tolerance * first || worst < negligible_share)) break;
   }
-  for (int sweep = 0; rigid_sweep() && sweep < most_sweeps; ++sweep) {
+  for (int sweep = 0; rigid_sweep() && sweep < most_surface_sweeps; ++sweep) {
   }
   for (TouchingPair& pair : scratch_.pairs) {
     if (pair.given > 0 && pair.record < 0) {
