@@ -91,6 +91,29 @@ TEST(Allocation, ContactWithRigidBodiesNeedsNone) {
   EXPECT_EQ(allocations(beam, {rigid}), 0);
 }
 
+// The first makes room for its records.
+TEST(Allocation, ASecondHitWithRestitutionNeedsNone) {
+  Body beam = make_beam_body(1);
+  Island island{.bodies = {&beam.body},
+                .rigid_bodies = {RigidBody()},
+                .impacts = {{.body = 0, .other_rigid = 0, .restitution = 0.8}}};
+  for (int i = 0; i < beam.particles().size(); ++i)
+    island.contacts.push_back(
+        {.a = Side::of_particles(0, WeightedPoint::at_particle(i)), .b = Side::of_rigid(0, {0, -0.1, 0})});
+  const PackedVectors start = beam.particles().positions;
+  std::array<long, 2> counts{};
+  for (long& count : counts) {
+    beam.particles().positions = start;
+    for (int i = 0; i < beam.particles().size(); ++i) beam.set_velocity(i, {0, -3, 0});
+    beam.body.positions_changed();
+    const long before = num_allocations;
+    for (int step = 0; step < 30; ++step) penalty::advance(island, 1.0 / 60);
+    count = num_allocations - before;
+    EXPECT_GT(linear_momentum(beam.particles()).y(), 4000);
+  }
+  EXPECT_EQ(counts[1], 0);
+}
+
 TEST(Allocation, PlasticFlowAndPhasesNeedNone) {
   const TetMesh mesh = make_box({1, 1, 1}, {3, 3, 3});
   PotentialField field =

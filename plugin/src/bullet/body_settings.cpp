@@ -24,6 +24,7 @@ const char* not_finite_setting(const btSoftBody& body) {
       {Real(config.timescale), "m_cfg.timescale is not finite"},
       {Real(config.kDF), "its friction, m_cfg.kDF, is not finite"},
       {Real(config.kDP), "m_cfg.kDP is not finite"},
+      {Real(body.getRestitution()), "its restitution is not finite"},
       {Real(config.drag), "m_cfg.drag is not finite"},
       {Real(config.kDG), "m_cfg.kDG is not finite"},
       {Real(config.kLF), "m_cfg.kLF is not finite"},

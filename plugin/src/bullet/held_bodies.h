@@ -54,7 +54,7 @@ struct HeldBody {
   StepOutcome outcome = StepOutcome::none;
   int switched_off = 0;            // of the flags in m_cfg.collisions, within a world step
   int activation_state = 0;        // to be restored
-  bool friction_is_finite = true;  // of what it touches
+  const char* left_out = nullptr;  // says what of what it touches is not finite
   std::vector<HeldAnchor> anchors;
   int number = 0;       // of the body in its island
   PackedVectors start;  // positions before the step, to go back to [m]

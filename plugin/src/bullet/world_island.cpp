@@ -60,6 +60,7 @@ void WorldIsland::advance(Real duration, Island& island) {
   island.contacts = contacts;
   island.anchors = anchors;
   island.rigid_contacts = rigid_contacts;
+  island.impacts = impacts;
   island.surfaces.clear();
   for (std::size_t k = 0; k < held.size(); ++k) held[k]->number = static_cast<int>(k);
   for (const auto& [pair, a, b, touched_by] : surfaces)
@@ -84,6 +85,7 @@ void WorldIsland::advance(Real duration, Island& island) {
   }
   penalty::advance(island, duration);
   rigid_contacts = island.rigid_contacts;
+  impacts = island.impacts;
   hand_out(duration, island.records);
 }
 

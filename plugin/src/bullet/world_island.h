@@ -21,6 +21,7 @@ struct WorldIsland {
   std::vector<Anchor> anchors;
   std::vector<HeldPair> surfaces;
   std::vector<RigidContact> rigid_contacts;
+  std::vector<Impact> impacts;
 
   /// Takes in what `from` holds, which is empty afterwards.
   void absorb(WorldIsland& from);

@@ -113,8 +113,12 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   }
   couplings.hold_coupled();
   join_islands(duration);
-  for (WorldIsland& island : islands_) advance(island, duration);
+  for (WorldIsland& island : islands_) {
+    impacts_.add(island);
+    advance(island, duration);
+  }
   rigid_manifolds_.remember(islands_);
+  impacts_.remember(islands_);
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) {
       stepped_.push_back(held);
@@ -148,7 +152,9 @@ void AttachedBodies::World::prepare(HeldBody& held, Real duration) {
   }
   WorldIsland island;
   island.held.push_back(&held);
-  held.friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);
+  const bool friction_is_finite = detect_contacts(held, island, rigid_bodies_, rigid_surfaces_, duration);
+  held.left_out =
+      friction_is_finite ? nullptr : "the friction of an object that it touches is not finite, and was left out";
   add_anchors(held, rigid_bodies_, island);
   wait_for_carried(held, island);
   islands_.push_back(std::move(island));
@@ -194,9 +200,9 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
       held->stepped.positions_changed();
       set_problem(report, "the step did not stay finite and was undone; look at particle ", report.first_bad_particle,
                   "");
-    } else if (!held->friction_is_finite)
-      shield([&] { report.problem = "the friction of an object that it touches is not finite, and was left out"; },
-             [](const char*) {});
+    } else if (held->left_out) {
+      shield([&] { report.problem = held->left_out; }, [](const char*) {});
+    }
     report_rejected(*held);
   }
 }

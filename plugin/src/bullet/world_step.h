@@ -6,6 +6,7 @@
 
 #include "couplings.h"
 #include "held_bodies.h"
+#include "impacts.h"
 #include "rigid_bodies.h"
 #include "rigid_manifolds.h"
 #include "rigid_surfaces.h"
@@ -52,6 +53,7 @@ class AttachedBodies::World {
   RigidManifolds rigid_manifolds_;
   RigidSurfaces rigid_surfaces_;
   Surfaces surfaces_;
+  Impacts impacts_;
   std::vector<WorldIsland> islands_;
   Island island_;  // the one that is being advanced; keeps its memory
   std::vector<HeldBody*> stepped_;

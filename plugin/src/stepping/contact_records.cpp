@@ -13,7 +13,8 @@ constexpr Real most_sliding = 0.5;  // share of the impulse with friction at its
 ContactRecord record_of(const ContactImpulse& given) {
   return {.normal = given.pressed.normalized(),
           .impulse = given.sum(),
-          .slides = given.sliding > most_sliding * given.pressing};
+          .slides = given.sliding > most_sliding * given.pressing,
+          .still_presses = given.is_last};
 }
 
 void book_depth(const Island& island, int body, Real depth) {

@@ -8,6 +8,7 @@
 #include "coupling.h"
 #include "energy_guard.h"
 #include "particle_contacts.h"
+#include "restitution.h"
 #include "rigid_contacts.h"
 #include "stepped_body.h"
 #include "surface_contacts.h"
@@ -365,6 +366,7 @@ void advance_explicitly(Island& island, Real duration) {
     undo(island, surfaces);
     for (SteppedBody* body : island.bodies) body->step_flows = {};
   }
+  give_back(island, duration);
   for (SteppedBody* body : island.bodies) end_step(*body, step.finite ? duration : 0);
 }
 

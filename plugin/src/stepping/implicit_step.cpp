@@ -1,10 +1,10 @@
 #include "implicit_step.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "energy_guard.h"
+#include "rigid_state.h"
 #include "stepped_body.h"
 
 namespace penalty {
@@ -14,45 +14,6 @@ constexpr int most_implicit_substeps = 16;  // of a step whose energy would grow
 constexpr Real growth_noise = 1e-12;        // relative growth of energy that is round-off
 constexpr Real sum_round_off = 1e-12;       // of a sum of forces, relative to the sum of their magnitudes
 constexpr Real round_off2 = 1e-28;          // square of that of positions, relative to the size of the body
-
-/// Mass, centre, momenta and inertia of particles that nothing holds.
-struct RigidState {
-  Real mass = 0;
-  Vector3 center = Vector3::Zero(), momentum = Vector3::Zero();
-  Vector3 spin = Vector3::Zero();     // angular momentum about the centre [kg m²/s]
-  Matrix3 inertia = Matrix3::Zero();  // about the centre [kg m²]
-
-  explicit RigidState(const Particles& particles, bool is_free = true) {
-    if (!is_free) return;
-    const Vector3 origin = particles.positions.col(0).head<3>();  // digits are scarce far from the world's
-    for (int i = 0; i < particles.size(); ++i) {
-      const Real m = 1 / particles.inverse_masses[i];
-      mass += m;
-      center += m * (particles.positions.col(i).head<3>() - origin);
-      momentum += m * particles.velocities.col(i).head<3>();
-    }
-    center = origin + center / mass;
-    for (int i = 0; i < particles.size(); ++i) {
-      const Real m = 1 / particles.inverse_masses[i];
-      const Vector3 arm = particles.positions.col(i).head<3>() - center;
-      spin += m * arm.cross(particles.velocities.col(i).head<3>() - momentum / mass);
-      inertia += m * (arm.squaredNorm() * Matrix3::Identity() - arm * arm.transpose());
-    }
-  }
-
-  /// The angular velocity of least energy with an angular momentum [rad/s]; about a line that all particles are on
-  /// there is none.
-  Vector3 angular_velocity(const Vector3& angular_momentum) const {
-    const Eigen::SelfAdjointEigenSolver<Matrix3> eigen(inertia);
-    Vector3 turn = Vector3::Zero();
-    for (int k = 0; k < 3; ++k)
-      if (eigen.eigenvalues()[k] > 1e-12 * eigen.eigenvalues()[2]) {
-        const Vector3 axis = eigen.eigenvectors().col(k);
-        turn += axis.dot(angular_momentum) / eigen.eigenvalues()[k] * axis;
-      }
-    return turn;
-  }
-};
 
 /// One backward Euler step of a body.
 class ImplicitStep {
@@ -212,7 +173,7 @@ void ImplicitStep::run() {
   choose_start();
   minimize();
   const PackedVectors& end = newton_.positions();
-  const RigidState before(particles_, is_free());
+  const RigidState before = is_free() ? RigidState(particles_) : RigidState();
   state_.acceleration = ((end - state_.from) / duration_ - particles_.velocities) / duration_;
   state_.has_acceleration = true;
   for (int i = 0; i < particles_.size(); ++i)

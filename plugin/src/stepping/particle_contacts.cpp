@@ -64,6 +64,7 @@ void ParticleContacts::begin(Real h, Real since) {
   rows_.reserve(island_.contacts.size());
   has_held_ = false;
   for (Contact& contact : island_.contacts) {
+    if (since > 0) contact.given.is_last = false;
     Row row;
     row.contact = &contact;
     row.body = island_.bodies[contact.a.body];

@@ -3,13 +3,14 @@
 #include <algorithm>
 
 #include "particle_contacts.h"
+#include "restitution.h"
 
 namespace penalty {
 namespace {
 
 constexpr Real rigid_slop = 1e-4;  // depth that may stay [m]
-constexpr Real impact = 4;  // approach, relative to what accelerations make of rest, whose impulse does not come again
-constexpr Real restitution_threshold = 0.2;  // approach that is an impact [m/s]: Bullet's
+// Approach, relative to what accelerations make of rest, whose impulse does not come again.
+constexpr Real impact_approach = 4;
 
 }  // namespace
 
@@ -37,7 +38,7 @@ void RigidContacts::begin(Real h, Real since) {
     const Real gap = row.normal.dot(at_a - at_b), speed = row.normal.dot(relative_velocity(row));
     row.recovery = std::clamp<Real>((-gap - rigid_slop) / std::max(recovery_time, h), 0, recovery_speed);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
-    row.is_impact = -speed > impact * acceleration_ * since;
+    row.is_impact = -speed > impact_approach * acceleration_ * since;
     if (-speed > restitution_threshold && -speed * h > gap)
       row.wanted = std::max(row.wanted, -contact.restitution * speed);
     rows_.push_back(row);

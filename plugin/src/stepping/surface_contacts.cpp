@@ -102,7 +102,7 @@ bool SurfaceContacts::refresh(Real h, Real remaining) {
 }
 
 void SurfaceContacts::sweep(Real h, Real remaining, Real since, const RigidSweep& rigid_sweep) {
-  take_velocities();
+  begin_sweeps();
   refresh(h, remaining);
   collect(h);
   if (converge(h, since, rigid_sweep)) take_velocities();
@@ -111,7 +111,7 @@ void SurfaceContacts::sweep(Real h, Real remaining, Real since, const RigidSweep
 }
 
 void SurfaceContacts::close(Real h, Real since, const RigidSweep& rigid_sweep) {
-  take_velocities();
+  begin_sweeps();
   refresh(h, h);
   collect(h);
   converge(h, since, rigid_sweep);
@@ -142,6 +142,11 @@ void SurfaceContacts::undo() {
   for (const auto& [surface, body] : rigid_surfaces_) surface->forget();
   take_positions();
   for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
+}
+
+void SurfaceContacts::begin_sweeps() {
+  take_velocities();
+  for (TouchingRecord& record : scratch_.records) record.given.is_last = false;
 }
 
 void SurfaceContacts::collect(Real h) {

@@ -149,6 +149,7 @@ class SurfaceContacts {
   void take_velocities();
   bool refresh(Real h, Real remaining);
   bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
+  void begin_sweeps();
   void collect(Real h);
   void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out,
            ContactMemory* memory, int* kept_record);

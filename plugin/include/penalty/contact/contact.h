@@ -47,6 +47,7 @@ class ContactMemory {
 struct ContactImpulse {
   Vector3 pressed = Vector3::Zero(), rubbed = Vector3::Zero();  // along the normals of the substeps, and across [N s]
   Real pressing = 0, sliding = 0;  // sizes along the normal, of all and of those with friction at its limit [N s]
+  bool is_last = false;            // of the last substep, too
 
   bool is_none() const { return !(pressing > 0); }
   Vector3 sum() const { return pressed + rubbed; }
@@ -57,12 +58,14 @@ struct ContactImpulse {
     rubbed += across;
     pressing += along;
     if (is_at_limit) sliding += along;
+    is_last = true;
   }
   void add(const ContactImpulse& other) {
     pressed += other.pressed;
     rubbed += other.rubbed;
     pressing += other.pressing;
     sliding += other.sliding;
+    is_last = is_last || other.is_last;
   }
 };
 
@@ -105,7 +108,7 @@ struct RigidContact {
   Vector3 anchor_a = Vector3::Zero(), anchor_b = Vector3::Zero();  // in their frames [m]
   Vector3 normal = Vector3::UnitY();                               // from b to a, in the frame of b
   Real friction = 0;                                               // Coulomb coefficient
-  Real restitution = 0;                                            // of approach that is no resting contact
+  Real restitution = 0;                                            // of speeds of approach; see Impact for soft bodies
 
   Vector3 force = Vector3::Zero();  // on a, of the last substep, be it of the last step [N]: where the next starts from
 };

@@ -13,6 +13,7 @@ struct ContactRecord {
   Vector3 impulse = Vector3::Zero();      // on the body [N s]
   Real gap = 0;                           // beyond the distance that is kept; negative: depth [m]
   bool slides = false;                    // friction was at its limit for most of the impulse
+  bool still_presses = false;             // in the last substep, too
 };
 
 }  // namespace penalty

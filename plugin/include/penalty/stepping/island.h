@@ -9,6 +9,7 @@
 #include "penalty/math/affine_span.h"
 #include "penalty/stepping/contact_record.h"
 #include "penalty/stepping/damper.h"
+#include "penalty/stepping/impact.h"
 #include "penalty/stepping/newton.h"
 #include "penalty/stepping/particles.h"
 #include "penalty/stepping/rigid_body.h"
@@ -55,6 +56,7 @@ struct SteppedBody {
   Real size = 0;                    // diagonal of the box about the rest shape [m]
   PackedVectors before_contacts;    // velocities [m/s]
   bool is_pushed = false;           // by contacts, in this step
+  Real pressing = 0;                // sizes of the impulses of contacts along their normals, in this step [N s]
   Particles start;                  // positions and velocities to go back to,
   FieldState start_state;           // and what flowed, broke and changed phase
   AffineSpan rest_span;
@@ -98,6 +100,7 @@ struct Island {
   std::vector<Anchor> anchors = {};
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
+  std::vector<Impact> impacts = {};               // pairs that have restitution, by body, other_body, other_rigid
 
   std::vector<ContactRecord> records = {};  // what pressed in the last step; contacts between rigid bodies left out
 
@@ -130,6 +133,9 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
 /// many substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen at the
 /// end of a block, up to eight times a step; what they take is no growth.
+///
+/// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
+/// end of a step.
 ///
 /// Implicitly, a body by itself, see Integrator: the positions at the end minimise
 ///

@@ -47,7 +47,7 @@ struct EnergyFlows {
   Real drag = 0;          // lost to the drag of the step
   Real inelastic = 0;     // lost to plastic flow and breaking
   Real integration = 0;   // lost to the numerical damping of implicit steps, by definition what is left over
-  Real contact_loss = 0;  // lost to impact and friction where the body touches: already in `contacts`
+  Real contact_loss = 0;  // lost to impact and friction, less what restitution gave back: already in `contacts`
 
   Real received() const { return constant_forces + contacts + couplings + driving + changes; }
   Real lost() const { return damping + drag + inelastic + integration; }
