@@ -75,7 +75,6 @@ std::vector<std::string> unused_settings(const btSoftBody& body) {
       {"the rest length scale", body.m_restLengthScale, 1, "make the field from the rest shape that is wanted"},
       {"m_dampingCoefficient", body.m_dampingCoefficient, 1, "StepOptions::damping_time damps"},
       {"m_repulsionStiffness", body.m_repulsionStiffness, btScalar(0.5), hard},
-      {"m_maxSpeedSquared", body.m_maxSpeedSquared, 0, "speeds have no limit; StepOptions::damping_time damps"},
   };
   std::vector<std::string> unused;
   for (const Setting& s : settings)
