@@ -65,9 +65,11 @@ struct Scene::Impl {
     world.set_gravity(to_bullet(setup.gravity));
 
     for (const RigidObject& object : setup.objects) add_rigid(object);
-    if (setup.ground)
+    if (setup.ground) {
       add_rigid({.shape = Block{{ground_half_width, ground_half_height, ground_half_width}},
                  .pose = {.position = {0, -ground_half_height, 0}}});
+      rigid_bodies.back()->setRestitution(1);
+    }
     for (SoftObject& object : setup.bodies) add_soft(object);
   }
 
@@ -116,6 +118,7 @@ struct Scene::Impl {
     for (int i = 0; i < object.velocities.cols(); ++i) body->m_nodes[i].m_v = to_bullet(object.velocities.col(i));
     // What is measured does not fall asleep, unless sleep is what the scene shows.
     body->forceActivationState(setup.sleeps ? ACTIVE_TAG : DISABLE_DEACTIVATION);
+    body->setRestitution(static_cast<btScalar>(object.restitution));
     world.add(*body);
     AttachOptions attach{.step = setup.step, .contact_points = object.mesh.contact_points()};
     if (object.mesh.surface) attach.surface = BodySurface::of(*object.mesh.surface);

@@ -17,6 +17,7 @@ struct SoftObject {
   int carrier = -1;                  // but this object of the scene, which has a path; -1: none
   std::vector<int> tip = {};         // vertices whose mean drop is followed
   Real friction = 0.7;               // Coulomb coefficient, multiplied with that of what it touches
+  Real restitution = 0;              // likewise; the ground has 1
   /// Called before each world step with the time at its start [s]: what changes about the elements in the course of the
   /// scene. Empty: nothing does. Before `control_start` it is not called, since looking for changes wakes the body.
   std::function<void(PotentialField& field, Real time)> control = {};

@@ -82,6 +82,22 @@ TEST_P(ContactClaims, ThePressedRingHasItsShapeAgain) {
   EXPECT_EQ(deepest, 0) << "the margin keeps it off slab and ground";
 }
 
+TEST_P(ContactClaims, BallsBounceHigherTheMoreRestitutionTheyHave) {
+  const auto scene = make("bounce", {.cells = 8});
+  const Real energy = scene->energies().total();
+  for (int step = 0; step < 2 * 60; ++step) {
+    scene->step(1.0 / 60);
+    ASSERT_LE(scene->energies().total(), (1 + 1e-3) * energy) << "step " << step;
+  }
+  const Real own = fact(*scene, "rebound_of_0"), half = fact(*scene, "rebound_of_0.5"),
+             most = fact(*scene, "rebound_of_0.9");
+  EXPECT_LT(own, 0.85);
+  EXPECT_GT(half, own + 0.02);
+  EXPECT_GT(most, half + 0.05);
+  EXPECT_GT(most, 0.8);
+  EXPECT_LT(most, 1);
+}
+
 TEST_P(ContactClaims, FingersLiftTheBallWithoutSlip) {
   const auto scene = make("hand", {.cells = 10});
   run(*scene, 4.5);
