@@ -1,6 +1,5 @@
 // Kinematic bodies carry, lift and wake soft ones, made kinematic by the flag alone or as Bullet's manual has it, with the
 // static flag that a body without mass has.
-#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include "bullet/simulation.h"
 
@@ -85,49 +84,6 @@ TEST_P(Movers, AMoverWakesABodyThatSleeps) {
 }
 
 INSTANTIATE_TEST_SUITE_P(World, Movers, both_worlds(), param_name);
-
-// Its links carry what they hit along, and are not braked by it.
-class Links : public WorldTest {};
-
-TEST_P(Links, OfAMultibodyPushAtTheirOwnSpeed) {
-  for (const bool of_base : {true, false}) {
-    SCOPED_TRACE(of_base);
-    Simulation of(GetParam());
-    btSoftBody& body = of.add_jelly(make_box({0.4, 0.4, 0.4}, {4, 4, 4}), {.attach = {.step = {.damping_time = 0.02}}});
-    btBoxShape shape(btVector3(btScalar(0.1), btScalar(0.3), btScalar(0.3)));
-    btMultiBody multibody(of_base ? 0 : 1, 1, btVector3(1, 1, 1), !of_base, false);
-    const btQuaternion none(0, 0, 0, 1);
-    multibody.setBaseWorldTransform(btTransform(none, btVector3(btScalar(-0.2), btScalar(0.2), btScalar(0.2))));
-    if (!of_base)
-      multibody.setupPrismatic(0, 1, btVector3(1, 1, 1), -1, none, btVector3(1, 0, 0), btVector3(0, 0, 0),
-                               btVector3(0, 0, 0), true);
-    multibody.finalizeMultiDof();
-    multibody.setLinearDamping(0);
-    if (of_base)
-      multibody.setBaseVel(btVector3(1, 0, 0));
-    else
-      multibody.setJointVel(0, 1);
-    btMultiBodyLinkCollider collider(&multibody, of_base ? -1 : 0);
-    collider.setCollisionShape(&shape);
-    collider.setWorldTransform(multibody.getBaseWorldTransform());
-    if (of_base)
-      multibody.setBaseCollider(&collider);
-    else
-      multibody.getLink(0).m_collider = &collider;
-    of.deformable_world().addCollisionObject(&collider);
-    of.deformable_world().addMultiBody(&multibody);
-    of.step(frame, 60);
-    const Real face = Real(collider.getWorldTransform().getOrigin().x()) + 0.1;
-    EXPECT_NEAR(face, 0.9, 0.02) << "goes on";
-    const Particles& particles = of.penalty().particles(body);
-    EXPECT_GT(particles.positions.row(0).minCoeff(), face);
-    EXPECT_GT(linear_momentum(particles).x(), 0.95) << "of 1 kg";
-    of.deformable_world().removeMultiBody(&multibody);
-    of.deformable_world().removeCollisionObject(&collider);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(World, Links, deformable_world(), param_name);
 
 }  // namespace
 }  // namespace penalty::testing

@@ -53,6 +53,98 @@ TEST(RigidBody, FallsWithItsAcceleration) {
   EXPECT_EQ(particle.body.report.retries, 0);
 }
 
+// Links of one articulated body that can move `ways` ways, in places of an array with another body between them.
+struct ArticulatedBody {
+  Articulation articulation;
+  std::vector<RigidBody> bodies;
+
+  ArticulatedBody(int num_links, int ways, Random& random) : bodies(2 * static_cast<std::size_t>(num_links)) {
+    const Eigen::MatrixXd jacobian =
+        Eigen::MatrixXd::NullaryExpr(6 * num_links, ways, [&] { return random.uniform(-1, 1); });
+    articulation.mobility = jacobian * jacobian.transpose();
+    articulation.inertia = articulation.mobility.completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::VectorXd motion = jacobian * Eigen::VectorXd::NullaryExpr(ways, [&] { return random.uniform(-1, 1); });
+    const Eigen::VectorXd acceleration =
+        jacobian * Eigen::VectorXd::NullaryExpr(ways, [&] { return random.uniform(-1, 1); });
+    for (int k = 0; k < num_links; ++k) {
+      articulation.places.push_back(2 * k + 1);
+      RigidBody& link = this->link(k);
+      link.articulation = &articulation;
+      link.link = k;
+      link.velocity = motion.segment<3>(6 * k);
+      link.angular_velocity = motion.segment<3>(6 * k + 3);
+      link.acceleration = acceleration.segment<3>(6 * k);
+      link.angular_acceleration = acceleration.segment<3>(6 * k + 3);
+    }
+  }
+  RigidBody& link(int k) { return bodies[static_cast<std::size_t>(articulation.places[static_cast<std::size_t>(k)])]; }
+  Real energy() const {
+    Real sum = 0;
+    for (const RigidBody& body : bodies) sum += kinetic_energy(body);
+    return sum;
+  }
+};
+
+TEST(Articulation, TakesPushesByTheMobilityOfItsLinksAndTheirWorkAsEnergy) {
+  Random random(7);
+  for (int run = 0; run < 20; ++run) {
+    ArticulatedBody body(3, 5, random);
+    RigidBody &pushed = body.link(run % 3), &other = body.link((run + 1) % 3);
+    EXPECT_TRUE(pushed.is_dynamic());
+    EXPECT_FALSE(pushed.is_free());
+    const Vector3 arm = random.vector(1), impulse = random.vector(2), before = pushed.velocity_at(arm);
+    const Vector3 of_other = other.velocity;
+    const Matrix3 mobility = pushed.mobility_at(arm);
+    const Real energy = body.energy(), work = pushed.push(impulse, arm);
+    EXPECT_LT((pushed.velocity_at(arm) - before - mobility * impulse).norm(), 1e-12);
+    EXPECT_LE(mobility.norm(), std::sqrt(3.0) * pushed.mobility_bound(arm.norm()));
+    EXPECT_NEAR(body.energy() - energy, work, 1e-9);
+    EXPECT_GT((other.velocity - of_other).norm(), 0);
+    EXPECT_TRUE(body.bodies[2].velocity.isZero(0)) << "of another body";
+  }
+}
+
+TEST(Articulation, IsAcceleratedByForcesWhoseWorkIsItsEnergy) {
+  Random random(9);
+  ArticulatedBody body(2, 4, random);
+  const std::vector<RigidBody> start = body.bodies;
+  const Real energy = body.energy();
+  for (int step = 0; step < 10; ++step)
+    for (RigidBody& link : body.bodies) {
+      link.kick(0.005);
+      link.drift(0.01);
+      link.kick(0.005);
+    }
+  Real work = 0;
+  for (std::size_t k = 0; k < start.size(); ++k) work += work_of_accelerations(body.bodies[k], start[k]);
+  EXPECT_GT(std::abs(work), 1e-3);
+  EXPECT_NEAR(body.energy() - energy, work, 1e-9);
+}
+
+TEST(Articulation, OfAFreeBodyMovesLikeIt) {
+  Random random(8);
+  RigidBody body = make_sphere(2, 0.3, {0, 1, 0}), link = body;
+  Articulation alone{{0}, Eigen::MatrixXd::Zero(6, 6), {}};
+  alone.mobility.diagonal() << body.inverse_mass, body.inverse_inertia.diagonal();
+  alone.inertia = alone.mobility.inverse();
+  link.articulation = &alone;
+  link.inverse_mass.setZero();
+  link.inverse_inertia.setZero();
+  for (RigidBody* one : {&body, &link}) one->acceleration = {0, -10, 3};
+  const RigidBody start = body;
+  for (int k = 0; k < 20; ++k) {
+    const Vector3 impulse = random.vector(1), arm = random.vector(0.3);
+    for (RigidBody* one : {&body, &link}) {
+      one->kick(0.01);
+      one->push(impulse, arm);
+      one->drift(0.01);
+    }
+  }
+  EXPECT_LT((body.position - link.position).norm() + (body.rotation - link.rotation).norm(), 1e-13);
+  EXPECT_NEAR(kinetic_energy(body), kinetic_energy(link), 1e-10);
+  EXPECT_NEAR(work_of_accelerations(body, start), work_of_accelerations(link, start), 1e-10);
+}
+
 TEST(Particles, MomentaAndEnergyCountOnlyWhatHasMass) {
   Particles p;
   p.positions = PackedVectors::Zero(4, 2);

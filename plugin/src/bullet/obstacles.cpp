@@ -135,12 +135,12 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     }
     // That a point will go relative to the object, left to itself.
     const auto way_of = [&](const Vector3& v, const Vector3& x) {
-      const Vector3 of_object = rigid && !stands_still(*rigid)
-                                    ? to_vector(rigid->getVelocityInLocalPoint(to_bullet(Vector3(x - origin))))
-                                    : Vector3(Vector3::Zero());
+      Vector3 of_object = link_velocity + link_spin.cross(x - origin);
+      if (rigid && !stands_still(*rigid))
+        of_object = to_vector(rigid->getVelocityInLocalPoint(to_bullet(Vector3(x - origin))));
       return Vector3(duration * (v - of_object + duration * stepped.gravity));
     };
-    const bool is_movable = rigid && !rigid->isStaticOrKinematicObject();
+    const bool is_movable = rigid ? !rigid->isStaticOrKinematicObject() : is_movable_link(*object);
     // What starts deep in a body that can move would be blown up around it, node by node.
     const Real deepest = is_movable ? std::max(margins_taken_back * margin, share_taken_back * size_of(object_box))
                                     : std::numeric_limits<Real>::infinity();

@@ -2,7 +2,6 @@
 
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
-#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
 
 #include <set>
 
@@ -52,24 +51,6 @@ void correct(const TouchedRigidBody& t, Real duration) {
 
 }  // namespace
 
-std::array<Vector3, 2> link_velocities(const btCollisionObject& object) {
-  std::array<Vector3, 2> velocities{Vector3::Zero(), Vector3::Zero()};
-  const btMultiBodyLinkCollider* collider = btMultiBodyLinkCollider::upcast(&object);
-  if (!collider || !collider->m_multiBody) return velocities;
-  const btMultiBody& body = *collider->m_multiBody;
-  if (collider->m_link < 0) {
-    velocities = {to_vector(body.getBaseVel()), to_vector(body.getBaseOmega())};
-  } else {
-    const std::size_t links = static_cast<std::size_t>(body.getNumLinks()) + 1, link = collider->m_link + 1U;
-    std::vector<btVector3> omega(links), velocity(links);  // in the frames of the links
-    body.compTreeLinkVelocities(omega.data(), velocity.data());
-    velocities = {to_vector(body.localDirToWorld(collider->m_link, velocity[link])),
-                  to_vector(body.localDirToWorld(collider->m_link, omega[link]))};
-  }
-  if (!velocities[0].allFinite() || !velocities[1].allFinite()) velocities.fill(Vector3::Zero());
-  return velocities;
-}
-
 bool stands_still(const btRigidBody& body) { return body.isStaticObject() && !body.isKinematicObject(); }
 
 Pose pose_at_start(const btCollisionObject& object, Real duration) {
@@ -88,6 +69,7 @@ Pose pose_at_start(const btCollisionObject& object, Real duration) {
 
 void RigidBodies::begin_step(Real duration, bool gravity_applied) {
   ++step_;
+  links_.begin_step(step_);
   duration_ = duration;
   gravity_applied_ = gravity_applied;
   std::erase_if(expectations_, [this](const auto& entry) { return entry.second.step < step_ - 1; });
@@ -100,13 +82,7 @@ RigidBody RigidBodies::start_of(const btCollisionObject& object) const {
   start.position = pose.origin;
   start.rotation = pose.rotation;
   const btRigidBody* body = btRigidBody::upcast(&object);
-  if (!body) {
-    const auto [velocity, angular_velocity] = link_velocities(object);
-    start.velocity = velocity;
-    start.angular_velocity = angular_velocity;
-    return start;
-  }
-  if (stands_still(*body)) return start;
+  if (!body || stands_still(*body)) return start;
   const bool is_dynamic = !body->isKinematicObject() && body->isActive() && body->getInvMass() > 0;
   if (!is_dynamic && !body->isKinematicObject()) return start;
   start.velocity = to_vector(body->getLinearVelocity());
@@ -135,13 +111,15 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
   btRigidBody* body = btRigidBody::upcast(&object);
   const bool wake = approached && body && !body->isStaticOrKinematicObject() && !body->isActive();
   if (wake) body->activate();
+  if (approached && !body) Links::wake(object);
   const int key = object.getBroadphaseHandle()->m_uniqueId;
   for (std::size_t k = 0; k < touched.size(); ++k)
     if (touched[k].key == key) {
       if (wake) touched[k].start = start_of(object);
       return static_cast<int>(k);
     }
-  touched.push_back({&object, body, key, bounds_of(object), start_of(object), {}});
+  touched.push_back({&object, body, key, bounds_of(object), start_of(object), {}, {}});
+  links_.read(touched.back(), duration_);
   return static_cast<int>(touched.size()) - 1;
 }
 
@@ -153,7 +131,7 @@ void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const
   for (std::size_t k = 0; k < touched.size(); ++k) {
     TouchedRigidBody& t = touched[k];
     t.state = states[k];
-    if (!t.start.is_dynamic()) continue;
+    if (!t.start.is_dynamic() || t.articulation) continue;
     const Vector3 dv = t.state.impulse.cwiseProduct(t.start.inverse_mass);
     const Vector3 dw = t.state.angular_velocity - t.start.angular_velocity;
     if (!dv.allFinite() || !dw.allFinite()) continue;
@@ -163,6 +141,7 @@ void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const
     const Vector3 expected = t.start.velocity + dv + duration_ * known_acceleration(body, gravity_applied_);
     if (expected.allFinite()) expectations_[t.key] = {step_, expected, t.state.impulse};
   }
+  links_.hand_back(touched);
 }
 
 void RigidBodies::correct(std::span<const TouchedRigidBody> touched, btBroadphaseInterface& world, Real duration) {
@@ -172,9 +151,13 @@ void RigidBodies::correct(std::span<const TouchedRigidBody> touched, btBroadphas
   if (!(box.high - box.low).allFinite()) return;  // none
   Present present;
   world.aabbTest(to_bullet(box.low), to_bullet(box.high), present);
-  for (const TouchedRigidBody& t : touched)
-    if (t.start.is_dynamic() && present.ids.contains(t.key) && t.body->isActive())  // who fell asleep was not moved
+  for (const TouchedRigidBody& t : touched) {
+    if (!t.start.is_dynamic() || !present.ids.contains(t.key)) continue;
+    if (t.articulation)
+      links_.observe(t);
+    else if (t.body->isActive())  // who fell asleep was not moved
       penalty::correct(t, duration);
+  }
 }
 
 }  // namespace penalty

@@ -1,10 +1,11 @@
 // Rigid bodies, read before the step and corrected after it.
 #pragma once
-#include <array>
+#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
 
+#include "links.h"
 #include "penalty/contact/box.h"
 #include "penalty/stepping/rigid_body.h"
 
@@ -26,16 +27,14 @@ struct Pose {
 /// end of the step, and comes there with its velocities.
 Pose pose_at_start(const btCollisionObject& object, Real duration);
 
-/// Velocity [m/s] and angular velocity [rad/s] of a link of a multibody; zero of other objects.
-std::array<Vector3, 2> link_velocities(const btCollisionObject& object);
-
 /// An object that takes part in a step.
 struct TouchedRigidBody {
   btCollisionObject* object;
-  btRigidBody* body;  // the same; null: an obstacle that is no rigid body
+  btRigidBody* body;  // the same; null: an obstacle that is no rigid body, or a link of a multibody
   int key;            // unique id of its broadphase proxy
   Box bounds;         // at the start
   RigidBody start, state;
+  std::shared_ptr<const Articulation> articulation;  // of a link that can move
 };
 
 /// One step's dealings with Bullet's rigid bodies, and what is expected of them in the next.
@@ -58,7 +57,7 @@ class RigidBodies {
   /// Moves touched bodies from where Bullet's integration with the end velocity put them to where the sub-cycle took
   /// them. Call after Bullet has integrated the transforms. Those that the world no longer has are left alone: callbacks
   /// of the application may have deleted them.
-  static void correct(std::span<const TouchedRigidBody> touched, btBroadphaseInterface& world, Real duration);
+  void correct(std::span<const TouchedRigidBody> touched, btBroadphaseInterface& world, Real duration);
 
  private:
   // What was expected of a rigid body after the last step: the difference is what other contacts did to it.
@@ -70,6 +69,7 @@ class RigidBodies {
   RigidBody start_of(const btCollisionObject& object) const;
 
   std::unordered_map<int, Expectation> expectations_;
+  Links links_;
   int step_ = 0;
   Real duration_ = 0;
   bool gravity_applied_ = false;

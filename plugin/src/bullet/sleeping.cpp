@@ -55,16 +55,16 @@ void wake_if_hit(btSoftBody& body) {
   const Real margin = body.getCollisionShape()->getMargin();
   for (btCollisionObject* object : obstacles_near(body, box, margin)) {
     const btRigidBody* rigid = btRigidBody::upcast(object);
-    if (!rigid || !rigid->isActive() || stands_still(*rigid)) continue;
-    if (Real(rigid->getLinearVelocity().length()) > waking_speed && bounds_of(*object).overlaps(box, 2 * margin))
-      body.activate(true);
+    if (!object->isActive() || (rigid && stands_still(*rigid))) continue;
+    const Real speed = rigid ? Real(rigid->getLinearVelocity().length()) : link_velocities(*object)[0].norm();
+    if (speed > waking_speed && bounds_of(*object).overlaps(box, 2 * margin)) body.activate(true);
   }
 }
 
 void wait_for_carried(const HeldBody& held, const WorldIsland& island) {
   for (const TouchedRigidBody& touched : island.touched)
-    if (touched.start.is_dynamic() && touched.body->getActivationState() != WANTS_DEACTIVATION &&
-        !is_anchored(held, *touched.body))
+    if (touched.start.is_dynamic() && touched.object->getActivationState() != WANTS_DEACTIVATION &&
+        !is_anchored(held, *touched.object))
       held.body->setDeactivationTime(0);
 }
 

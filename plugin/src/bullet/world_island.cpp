@@ -48,7 +48,8 @@ void WorldIsland::absorb(WorldIsland& from) {
 bool WorldIsland::shares_a_rigid_body_with(const WorldIsland& other) const {
   for (const TouchedRigidBody& first : touched)
     for (const TouchedRigidBody& second : other.touched)
-      if (first.key == second.key && first.start.is_dynamic()) return true;
+      if (first.start.is_dynamic() && (first.key == second.key || are_of_one_multibody(*first.object, *second.object)))
+        return true;
   return false;
 }
 

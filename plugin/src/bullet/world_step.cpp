@@ -187,6 +187,7 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
   };
   shield(
       [&] {
+        Links::couple(island.touched);
         island.advance(duration, island_);
         rigid_bodies_.hand_back(island.touched, island_.rigid_bodies);
       },
@@ -248,7 +249,7 @@ void AttachedBodies::World::tell_contacts() noexcept {
 void AttachedBodies::World::correct_rigid_bodies(Real duration) noexcept {
   shield(
       [&] {
-        for (const WorldIsland& island : islands_) RigidBodies::correct(island.touched, *broadphase_, duration);
+        for (const WorldIsland& island : islands_) rigid_bodies_.correct(island.touched, *broadphase_, duration);
       },
       [](const char*) {});
   islands_.clear();

@@ -27,8 +27,8 @@ using Six = Eigen::Matrix<Real, 6, 1>;
 
 // Makes changes of velocities of what is an impulse and its moment.
 void apply_mobility(const RigidBody& rigid, Eigen::Ref<Six> wrench) {
-  const Vector3 impulse = wrench.head<3>(), moment = wrench.tail<3>();
-  wrench << rigid.inverse_mass.cwiseProduct(impulse), rigid.inverse_inertia * moment;
+  const auto [dv, dw] = rigid.response(wrench.head<3>(), wrench.tail<3>());
+  wrench << dv, dw;
 }
 
 auto key_of(const Anchor* anchor) {

@@ -53,8 +53,7 @@ Real mobility_bound(const Side& point, const Coupling& coupling, const Island& i
     const RigidBody& body = island.rigid_bodies[point.rigid];
     const auto count = std::count_if(coupling.points.begin(), coupling.points.end(),
                                      [&](const Side& other) { return other.is_rigid() && other.rigid == point.rigid; });
-    return static_cast<Real>(count) *
-           (body.inverse_mass.maxCoeff() + body.inverse_inertia.norm() * point.anchor.squaredNorm());
+    return static_cast<Real>(count) * body.mobility_bound(point.anchor.norm());
   }
   const std::vector<Real>& inverse_masses = island.bodies[point.body]->particles.inverse_masses;
   Real row_sum = 0;

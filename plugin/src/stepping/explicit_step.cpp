@@ -192,7 +192,7 @@ class SubCycle {
   // Rigid bodies, by what acts on them, and everything that is coupled, by the couplings.
   void kick_others(Real time) {
     since_contacts_ += time;
-    for (RigidBody& body : island_.rigid_bodies) body.velocity += time * body.acceleration;
+    for (RigidBody& body : island_.rigid_bodies) body.kick(time);
     for (const Coupling* coupling : island_.couplings) kick(*coupling, island_, time);
   }
 

@@ -125,12 +125,8 @@ Real constant_force_work(Island& island) {
     body->step_flows.constant_forces = constant_force_work(*body);
     work += body->step_flows.constant_forces;
   }
-  for (std::size_t k = 0; k < island.rigid_bodies.size(); ++k) {
-    const RigidBody& body = island.rigid_bodies[k];
-    for (int axis = 0; axis < 3; ++axis)
-      work += inverse_or_zero(body.inverse_mass[axis]) * body.acceleration[axis] *
-              (body.position[axis] - island.rigid_start[k].position[axis]);
-  }
+  for (std::size_t k = 0; k < island.rigid_bodies.size(); ++k)
+    work += work_of_accelerations(island.rigid_bodies[k], island.rigid_start[k]);
   return work;
 }
 
