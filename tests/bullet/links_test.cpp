@@ -108,6 +108,28 @@ TEST_P(Links, AFreeBaseKeepsTheMomentumOfWhatItHits) {
   }
 }
 
+TEST_P(Links, ThrowBackWithRestitutionAndKeepTheMomentum) {
+  Real last = 0;
+  for (const Real restitution : {0.0, 0.5, 0.9}) {
+    SCOPED_TRACE(restitution);
+    Simulation of(GetParam());
+    btSoftBody& jelly =
+        of.add_jelly(make_box({0.4, 0.4, 0.4}, {4, 4, 4}), {.attach = {.step = {.damping_time = 0.02}}});
+    jelly.setRestitution(static_cast<btScalar>(restitution));
+    Boxes base(of, 0, 1, {-0.3, 0.25, 0.2});
+    base.add_box(-1, {0.1, 0.1, 0.1}).setRestitution(1);
+    base.enter();
+    base.body.setBaseVel(vector(1, 0, 0));
+    of.step(frame, 60);
+    const Particles& particles = of.penalty().particles(jelly);
+    const Vector3 of_jelly = linear_momentum(particles), of_base = to_vector(base.body.getBaseVel());
+    EXPECT_LT((of_jelly + of_base - Vector3(1, 0, 0)).norm(), limit(1e-13, 1e-6));
+    EXPECT_GT(of_jelly.x() - of_base.x(), last + 0.02);
+    EXPECT_LT(kinetic_energy(particles) + of_base.squaredNorm() / 2, 0.5);
+    last = of_jelly.x() - of_base.x();
+  }
+}
+
 TEST_P(Links, WhoseMotorHoldsThemCarryAtTheMargin) {
   for (const bool sideways : {false, true})
     for (const Real speed : {0.0, 0.05, 0.5}) {
