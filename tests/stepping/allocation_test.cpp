@@ -72,6 +72,47 @@ TEST(Allocation, AnchorsNeedNoneInASubstep) {
   EXPECT_EQ(counts[0], counts[1]);
 }
 
+// A pair of balls on a joint, as what knows its joints says it.
+class Ball final : public JointSource {
+ public:
+  void add_rows(std::span<const RigidBody> bodies, Real h, Real since, std::vector<JointRow>& rows) override {
+    const Vector3 at = (bodies[0].position + bodies[1].position) / 2;
+    for (int axis = 0; axis < 4; ++axis) {
+      const Vector3 n = Vector3::Unit(axis % 3);
+      JointRow row{.number = axis,
+                   .linear_a = n,
+                   .angular_a = (at - bodies[0].position).cross(n),
+                   .linear_b = -n,
+                   .angular_b = -(at - bodies[1].position).cross(n)};
+      if (axis < 3) row.recovery = n.dot(bodies[1].position + Vector3(1, 0, 0) - bodies[0].position) / h;
+      if (axis == 3) {  // a brake
+        row.most = since;
+        row.least = -since;
+      }
+      rows.push_back(row);
+    }
+  }
+};
+
+TEST(Allocation, JointsNeedNoneInASubstep) {
+  std::array<long, 2> counts{};
+  for (const std::size_t many : {0, 1}) {
+    Body beam = make_beam_body(1);
+    beam.body.options.substeps = many ? 400 : 200;
+    Ball ball;
+    Island island{.bodies = {&beam.body},
+                  .rigid_bodies = {make_sphere(3, 0.5, {3, 9, 0}), make_sphere(3, 0.5, {2, 9, 0})},
+                  .joints = {{.a = 0, .b = 1}},
+                  .joint_source = &ball};
+    island.rigid_bodies[0].angular_velocity = Vector3(1, 2, 3);
+    penalty::advance(island, 1.0 / 60);
+    const long before = num_allocations;
+    penalty::advance(island, 1.0 / 60);
+    counts[many] = num_allocations - before;
+  }
+  EXPECT_EQ(counts[0], counts[1]);
+}
+
 TEST(Allocation, ARetriedStepNeedsNone) {
   Body beam = make_beam_body(1);
   beam.particles().positions.row(0) *= 4;

@@ -7,6 +7,7 @@
 #include "anchors.h"
 #include "coupling.h"
 #include "energy_guard.h"
+#include "joints.h"
 #include "particle_contacts.h"
 #include "restitution.h"
 #include "rigid_contacts.h"
@@ -58,12 +59,13 @@ class SubCycle {
       : island_(island),
         surfaces_(surfaces),
         rigid_contacts_(island),
+        joints_(island),
         particle_contacts_(island),
         anchors_(island),
         duration_(duration) {
-    has_contacts_ =
-        !particle_contacts_.is_empty() || !anchors_.is_empty() || !surfaces.is_empty() || !rigid_contacts_.is_empty();
-    are_coupled_ = !rigid_contacts_.is_empty() || !anchors_.is_empty() || particle_contacts_.are_coupled();
+    are_coupled_ =
+        !rigid_contacts_.is_empty() || !joints_.is_empty() || !anchors_.is_empty() || particle_contacts_.are_coupled();
+    has_contacts_ = are_coupled_ || !particle_contacts_.is_empty() || !surfaces.is_empty();
     for (const SteppedBody* body : island_.bodies) {
       damps_ = damps_ || damps(*body);
       evolves_ = evolves_ || body->field->evolves();
@@ -87,9 +89,7 @@ class SubCycle {
     const int per_block = (substeps + blocks - 1) / blocks;
     const Real h = duration_ / (blocks * per_block);
     outside_work_ = since_contacts_ = 0;
-    rigid_contacts_.begin_attempt();
-    particle_contacts_.begin_attempt();
-    anchors_.begin_attempt();
+    for_each_constraint([](auto& constraints) { constraints.begin_attempt(); });
     remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) {
       body->step_flows = {};
@@ -123,10 +123,20 @@ class SubCycle {
   }
 
   Real outside_work() const {
-    return outside_work_ + rigid_contacts_.outside_work() + particle_contacts_.outside_work() + anchors_.outside_work();
+    return outside_work_ + rigid_contacts_.outside_work() + joints_.outside_work() + particle_contacts_.outside_work() +
+           anchors_.outside_work();
   }  // of obstacles, of driven particles, of taking depth back [J]
 
  private:
+  // What is met in the sweeps of a substep.
+  template <class Call>
+  void for_each_constraint(const Call& call) {
+    call(rigid_contacts_);
+    call(joints_);
+    call(particle_contacts_);
+    call(anchors_);
+  }
+
   void substep(Real kick_time, Real h) {
     kick_others(kick_time);
     if (has_contacts_) {
@@ -148,7 +158,7 @@ class SubCycle {
 
   // Once over the contacts with and between rigid bodies; returns whether that is to be done again.
   bool sweep(Real h) {
-    const Real of_rigid = rigid_contacts_.sweep(),
+    const Real of_rigid = std::max(joints_.sweep(), rigid_contacts_.sweep()),
                of_particles = std::max(anchors_.sweep(), particle_contacts_.sweep());
     if (!are_coupled_) return false;
     const Real change = std::max(of_rigid, of_particles);
@@ -165,12 +175,11 @@ class SubCycle {
     for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
     sweeps_ = 0;
     rigid_contacts_.begin(h, since_contacts_);
+    joints_.begin(h, since_contacts_, kick_time > 0);  // no drift follows where no kick is counted
     particle_contacts_.begin(h, since_contacts_);
     anchors_.begin(h, since_contacts_);
     solve();
-    rigid_contacts_.end(since_contacts_);
-    particle_contacts_.end(since_contacts_);
-    anchors_.end(since_contacts_);
+    for_each_constraint([this](auto& constraints) { constraints.end(since_contacts_); });
     since_contacts_ = 0;
     for (SteppedBody* body : island_.bodies) {
       const Particles& particles = body->particles;
@@ -244,6 +253,7 @@ class SubCycle {
   Island& island_;
   SurfaceContacts& surfaces_;
   RigidContacts rigid_contacts_;
+  Joints joints_;
   ParticleContacts particle_contacts_;
   Anchors anchors_;
   Real duration_, remaining_ = 0;
@@ -287,7 +297,7 @@ void undo(Island& island, SurfaceContacts& surfaces) {
 }
 
 int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real duration) {
-  int substeps = surfaces.least_substeps();
+  int substeps = std::max(surfaces.least_substeps(), Joints::least_substeps(island, duration));
   // It ends a step half a substep's fall too fast, whatever holds it.
   if (std::any_of(island.contacts.begin(), island.contacts.end(), [&](const Contact& contact) {
         const std::vector<Real>& inverse_masses = island.bodies[contact.a.body]->particles.inverse_masses;

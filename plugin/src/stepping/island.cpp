@@ -19,7 +19,7 @@ bool wants_implicit_step(const SteppedBody& body, Real duration) {
 
 bool steps_implicitly(Island& island, Real duration) {
   if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty() || !island.anchors.empty() ||
-      !island.rigid_contacts.empty())
+      !island.rigid_contacts.empty() || !island.joints.empty())
     return false;
   if (!wants_implicit_step(*island.bodies.front(), duration)) return false;
   SurfaceContacts surfaces(island);

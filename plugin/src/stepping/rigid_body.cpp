@@ -89,6 +89,9 @@ Real work_of_accelerations(const RigidBody& body, const RigidBody& start) {
     for (int axis = 0; axis < 3; ++axis)
       if (body.inverse_mass[axis] > 0)
         work += body.acceleration[axis] / body.inverse_mass[axis] * (body.position[axis] - start.position[axis]);
+    if (!body.angular_acceleration.isZero(0) && !start.inverse_inertia.isZero(0))
+      work += body.angular_acceleration.dot(
+          start.inverse_inertia.completeOrthogonalDecomposition().solve(body.turn - start.turn));
     return work;
   }
   if (body.link != 0) return 0;

@@ -10,6 +10,7 @@
 #include "penalty/stepping/contact_record.h"
 #include "penalty/stepping/damper.h"
 #include "penalty/stepping/impact.h"
+#include "penalty/stepping/joint.h"
 #include "penalty/stepping/newton.h"
 #include "penalty/stepping/particles.h"
 #include "penalty/stepping/rigid_body.h"
@@ -100,6 +101,8 @@ struct Island {
   std::vector<Anchor> anchors = {};
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
+  std::vector<Joint> joints = {};
+  JointSource* joint_source = nullptr;            // of these joints, if there are any
   std::vector<Impact> impacts = {};               // pairs that have restitution, by body, other_body, other_rigid
 
   std::vector<ContactRecord> records = {};  // what pressed in the last step; contacts between rigid bodies left out

@@ -27,10 +27,11 @@ struct RigidBody {
   Matrix3 inverse_inertia = Matrix3::Zero();   // world, at `rotation` [1/(kg m²)]
   Vector3 acceleration = Vector3::Zero();      // that acts besides the contacts: gravity, other contacts [m/s²]
 
+  Vector3 angular_acceleration = Vector3::Zero();  // likewise [rad/s²]
+
   // A link of an articulated body lies in one array with the others, and has no inverse mass and inertia of its own.
   const Articulation* articulation = nullptr;
-  int link = 0;                                    // the number of this one among them
-  Vector3 angular_acceleration = Vector3::Zero();  // that acts besides the contacts [rad/s²]
+  int link = 0;  // the number of this one among them
 
   Vector3 impulse = Vector3::Zero();          // that it was given, summed [N s]
   Vector3 angular_impulse = Vector3::Zero();  // about the centre of mass [N m s]
@@ -74,6 +75,18 @@ struct RigidBody {
     impulse += given;
     angular_impulse += moment;
     return work;
+  }
+
+  /// Gives it an impulse [N s] at the centre of mass and a moment [N m s] about it, booked likewise.
+  void give(const Vector3& given, const Vector3& moment) {
+    if (articulation) {
+      push_links(given, moment);
+    } else {
+      velocity += inverse_mass.cwiseProduct(given);
+      angular_velocity += inverse_inertia * moment;
+    }
+    impulse += given;
+    angular_impulse += moment;
   }
 
   /// Changes of its velocities [m/s], [rad/s] by an impulse [N s] at the centre of mass and a moment [N m s] about it.
