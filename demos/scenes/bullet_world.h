@@ -39,6 +39,7 @@ class BulletWorld {
       deformable_ = world.get();
       world_ = std::move(world);
     }
+    if (attached_) attached_->take_joints_of(*world_);
   }
 
   btDiscreteDynamicsWorld& world() { return *world_; }

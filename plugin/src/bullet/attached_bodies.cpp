@@ -129,6 +129,7 @@ PotentialField& AttachedBodies::edit(const btSoftBody& body) {
   held.stepped.positions_changed();
   return held.field;
 }
+void AttachedBodies::take_joints_of(btDiscreteDynamicsWorld& world) { attached_->joints.take_from(world); }
 int AttachedBodies::couple(const std::vector<CouplingPoint>& points, PotentialField field, Real damping_time) {
   return attached_->couplings.add(*attached_->bodies, points, std::move(field), damping_time);
 }

@@ -75,8 +75,9 @@ void PenaltyDeformableBodySolver::predictMotion(btScalar time_step) {
   attached_->freeze_held(bodies);
 }
 
-// Anchors of attached bodies are in the step: Bullet does not see them.
+// Anchors of attached bodies are in the step, and so are joints: Bullet does not see them.
 void PenaltyDeformableBodySolver::setConstraints(const btContactSolverInfo& info) {
+  attached_->joints.hide();
   std::vector<std::pair<btSoftBody*, decltype(btSoftBody::m_deformableAnchors)>> hidden;
   for (btSoftBody* body : listed(m_softBodies))
     if (is_attached(*body) && body->m_deformableAnchors.size() > 0) {
@@ -88,6 +89,7 @@ void PenaltyDeformableBodySolver::setConstraints(const btContactSolverInfo& info
 }
 
 void PenaltyDeformableBodySolver::solveDeformableConstraints(btScalar time_step) {
+  attached_->joints.show();
   if (all_attached())
     updateVelocity();
   else

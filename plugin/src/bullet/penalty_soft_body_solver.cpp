@@ -47,7 +47,9 @@ void PenaltySoftBodySolver::predictMotion(btScalar time_step) {
   for (btSoftBody* body : bodies)
     if (!is_attached(*body) && body->isActive()) body->predictMotion(time_step);
 
-  for (HeldBody* held : attached_->step(bodies, time_step, false)) {
+  const auto stepped = attached_->step(bodies, time_step, false);
+  attached_->joints.hide();
+  for (HeldBody* held : stepped) {
     btSoftBody& body = *held->body;
     Particles& particles = held->stepped.particles;
     if (body.m_cfg.kDP > 0) particles.velocities *= 1 - Real(body.m_cfg.kDP);
@@ -72,6 +74,7 @@ void PenaltySoftBodySolver::drop_removed() {
 
 void PenaltySoftBodySolver::solveConstraints(btScalar time_step) {
   drop_removed();
+  attached_->joints.show();
   const std::span<btSoftBody* const> bodies = listed(m_softBodySet);
   for (btSoftBody* body : bodies) {
     HeldBody* held = attached_->bodies->find(*body);

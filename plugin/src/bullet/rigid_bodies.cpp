@@ -3,6 +3,7 @@
 #include <BulletCollision/BroadphaseCollision/btBroadphaseInterface.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
+#include <cmath>
 #include <set>
 
 #include "convert.h"
@@ -24,6 +25,18 @@ Matrix3 inverse_inertia(const btRigidBody& body) {
   return factor * to_matrix(body.getInvInertiaTensorWorld()) * factor;
 }
 
+// Likewise, with what Bullet's solver adds to the spin of a body with unequal moments of inertia.
+Vector3 known_angular_acceleration(const btRigidBody& body, bool forces_applied, Real duration) {
+  const auto step = static_cast<btScalar>(duration);
+  Vector3 change = Vector3::Zero();
+  if (body.getFlags() & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY)
+    change = to_vector(body.computeGyroscopicImpulseImplicit_Body(step));
+  else if (body.getFlags() & BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD)
+    change = to_vector(body.computeGyroscopicImpulseImplicit_World(step));
+  if (!forces_applied) change += duration * (inverse_inertia(body) * to_vector(body.getTotalTorque()));
+  return change.allFinite() ? Vector3(change / duration) : Vector3::Zero();
+}
+
 // The unique ids of the proxies in a box.
 class Present final : public btBroadphaseAabbCallback {
  public:
@@ -35,15 +48,18 @@ class Present final : public btBroadphaseAabbCallback {
 };
 
 void correct(const TouchedRigidBody& t, Real duration) {
-  const Vector3 shift = t.state.position - t.start.position - duration * t.state.velocity;
-  const Vector3 turn = t.state.turn - duration * t.state.angular_velocity;
-  if (!shift.allFinite() || !turn.allFinite()) return;
+  RigidBody end = t.start;  // where the end velocities lead
+  end.velocity = t.state.velocity;
+  end.angular_velocity = t.state.angular_velocity;
+  end.drift(duration);
+  const Vector3 shift = t.state.position - end.position;
+  const Eigen::AngleAxis<Real> turn(Matrix3(t.state.rotation * end.rotation.transpose()));
+  if (!shift.allFinite() || !std::isfinite(turn.angle())) return;
   btTransform transform = t.body->getWorldTransform();
   transform.setOrigin(transform.getOrigin() + to_bullet(shift));
-  const Real angle = turn.norm();
-  if (angle > 1e-12)
+  if (turn.angle() > 1e-12)
     transform.setRotation(
-        (btQuaternion(to_bullet(Vector3(turn / angle)), static_cast<btScalar>(angle)) * transform.getRotation())
+        (btQuaternion(to_bullet(turn.axis()), static_cast<btScalar>(turn.angle())) * transform.getRotation())
             .normalized());
   t.body->setWorldTransform(transform);
   t.body->setInterpolationWorldTransform(transform);
@@ -125,6 +141,7 @@ int RigidBodies::touch(btCollisionObject& object, bool approached, std::vector<T
 
 void RigidBodies::expect_no_others(TouchedRigidBody& touched) const {
   touched.start.acceleration = known_acceleration(*touched.body, gravity_applied_);
+  touched.start.angular_acceleration = known_angular_acceleration(*touched.body, gravity_applied_, duration_);
 }
 
 void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const RigidBody> states) {
@@ -133,7 +150,8 @@ void RigidBodies::hand_back(std::span<TouchedRigidBody> touched, std::span<const
     t.state = states[k];
     if (!t.start.is_dynamic() || t.articulation) continue;
     const Vector3 dv = t.state.impulse.cwiseProduct(t.start.inverse_mass);
-    const Vector3 dw = t.state.angular_velocity - t.start.angular_velocity;
+    const Vector3 dw = t.state.angular_velocity - t.start.angular_velocity -
+                       duration_ * t.start.angular_acceleration;  // which Bullet's solver adds
     if (!dv.allFinite() || !dw.allFinite()) continue;
     btRigidBody& body = *t.body;
     body.setLinearVelocity(body.getLinearVelocity() + to_bullet(dv));

@@ -6,6 +6,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletSoftBody/btSoftBody.h>
 
@@ -18,6 +19,7 @@
 
 #include "convert.h"
 #include "obstacles.h"
+#include "rigid_joints.h"
 #include "shape_edges.h"
 #include "surface_distance.h"
 #include "world_island.h"
@@ -187,56 +189,101 @@ bool is_finite(const RigidContact& contact) {
 
 }  // namespace
 
-void RigidManifolds::add(std::vector<WorldIsland>& islands, const btSoftBodyWorldInfo& info,
-                         const RigidBodies& rigid_bodies, Real duration) {
-  auto* dispatcher = dynamic_cast<btCollisionDispatcher*>(info.m_dispatcher);
-  Owners owners(islands);
-  std::vector<int> reached = owners.keys();
-  if (!dispatcher || reached.empty()) return;
-  const auto pairs = pairs_by_object(*info.m_broadphase->getOverlappingPairCache());
-  std::set<const btBroadphasePair*> done;
-  btManifoldArray manifolds;
-  std::vector<Point> points;
-  for (std::size_t k = 0; k < reached.size(); ++k) {
-    const auto of_body = pairs.find(reached[k]);
-    if (of_body == pairs.end()) continue;
-    for (btBroadphasePair* pair : of_body->second) {
-      if (!done.insert(pair).second) continue;
-      const std::array objects{static_cast<btCollisionObject*>(pair->m_pProxy0->m_clientObject),
-                               static_cast<btCollisionObject*>(pair->m_pProxy1->m_clientObject)};
-      if (!dispatcher->needsCollision(objects[0], objects[1])) continue;
-      points.clear();
-      detect(*pair, *dispatcher, points);
-      if (!pair->m_algorithm) continue;
-      manifolds.resize(0);
-      pair->m_algorithm->getAllContactManifolds(manifolds);
-      for (int m = 0; m < manifolds.size(); ++m) add_remembered(*manifolds[m], points);
-      if (points.empty()) add_ahead(*objects[0], *objects[1], duration, points);
-      if (points.empty()) continue;
+// What is reached in a step, from whom.
+struct RigidManifolds::Reach {
+  Reach(std::vector<WorldIsland>& islands, const RigidBodies& bodies, Real step)
+      : rigid_bodies(bodies), duration(step), owners(islands), reached(owners.keys()) {}
 
-      WorldIsland* island = owners.of(reached[k]);
-      for (const btCollisionObject* object : objects)
-        if (WorldIsland* other = owners.of(id_of(*object)); other && other != island) owners.merge(*island, *other);
-      std::array<int, 2> numbers{};
-      for (int side = 0; side < 2; ++side) {
-        numbers[side] = rigid_bodies.touch(*objects[side], false, island->touched);
-        TouchedRigidBody& touched = island->touched[numbers[side]];
-        if (!touched.start.is_dynamic()) continue;
-        rigid_bodies.expect_no_others(touched);
-        if (owners.of(touched.key)) continue;
-        owners.add(touched.key, *island);
-        reached.push_back(touched.key);
-      }
-      std::vector<RigidContact> contacts;
-      for (const Point& point : points) {
-        const bool swapped = point.a != objects[0];
-        const RigidContact contact = contact_of(point, numbers[swapped], numbers[!swapped]);
-        if (is_finite(contact)) contacts.push_back(contact);
-      }
-      recall(island->touched, std::min(size_of(*objects[0]), size_of(*objects[1])), contacts);
-      island->rigid_contacts.insert(island->rigid_contacts.end(), contacts.begin(), contacts.end());
-    }
+  WorldIsland& join(int key, std::span<btCollisionObject* const> objects) {
+    WorldIsland& island = *owners.of(key);
+    for (const btCollisionObject* object : objects)
+      if (WorldIsland* other = owners.of(id_of(*object)); other && other != &island) owners.merge(island, *other);
+    return island;
   }
+
+  // The number of the object in the island. All that acts on it is in the island from now on.
+  int take_in(btCollisionObject& object, bool approached, WorldIsland& island) {
+    const int number = rigid_bodies.touch(object, approached, island.touched);
+    TouchedRigidBody& touched = island.touched[number];
+    if (!touched.start.is_dynamic()) return number;
+    rigid_bodies.expect_no_others(touched);
+    if (owners.of(touched.key)) return number;
+    owners.add(touched.key, island);
+    reached.push_back(touched.key);
+    return number;
+  }
+
+  const RigidBodies& rigid_bodies;
+  Real duration;
+  Owners owners;
+  std::vector<int> reached;  // grows on the way
+  std::vector<Point> points = {};
+  btManifoldArray manifolds = {};
+};
+
+void RigidManifolds::add(std::vector<WorldIsland>& islands, const btSoftBodyWorldInfo& info,
+                         const RigidBodies& rigid_bodies, RigidJoints& joints, Real duration) {
+  auto* dispatcher = dynamic_cast<btCollisionDispatcher*>(info.m_dispatcher);
+  Reach reach(islands, rigid_bodies, duration);
+  if (!dispatcher || reach.reached.empty()) return;
+  joints.list();
+  const auto pairs = pairs_by_object(*info.m_broadphase->getOverlappingPairCache());
+  std::set<const void*> done;
+  for (std::size_t k = 0; k < reach.reached.size(); ++k) {
+    const int key = reach.reached[k];
+    for (btTypedConstraint* joint : joints.of(key))
+      if (done.insert(joint).second) add_joint(*joint, joints, key, reach);
+    const auto of_body = pairs.find(key);
+    if (of_body == pairs.end()) continue;
+    for (btBroadphasePair* pair : of_body->second)
+      if (done.insert(pair).second) add_contacts(*pair, *dispatcher, key, reach);
+  }
+}
+
+void RigidManifolds::add_contacts(btBroadphasePair& pair, btCollisionDispatcher& dispatcher, int key,
+                                  Reach& reach) const {
+  const std::array objects{static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject),
+                           static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
+  if (!dispatcher.needsCollision(objects[0], objects[1])) return;
+  std::vector<Point>& points = reach.points;
+  points.clear();
+  detect(pair, dispatcher, points);
+  if (!pair.m_algorithm) return;
+  reach.manifolds.resize(0);
+  pair.m_algorithm->getAllContactManifolds(reach.manifolds);
+  for (int m = 0; m < reach.manifolds.size(); ++m) add_remembered(*reach.manifolds[m], points);
+  if (points.empty()) add_ahead(*objects[0], *objects[1], reach.duration, points);
+  if (points.empty()) return;
+
+  WorldIsland& island = reach.join(key, objects);
+  const std::array numbers{reach.take_in(*objects[0], false, island), reach.take_in(*objects[1], false, island)};
+  std::vector<RigidContact> contacts;
+  for (const Point& point : points) {
+    const bool swapped = point.a != objects[0];
+    const RigidContact contact = contact_of(point, numbers[swapped], numbers[!swapped]);
+    if (is_finite(contact)) contacts.push_back(contact);
+  }
+  recall(island.touched, std::min(size_of(*objects[0]), size_of(*objects[1])), contacts);
+  island.rigid_contacts.insert(island.rigid_contacts.end(), contacts.begin(), contacts.end());
+}
+
+// One that holds a body of no world is left to Bullet, as is one of too many rows. What holds a single body holds it to the
+// world.
+void RigidManifolds::add_joint(btTypedConstraint& joint, const RigidJoints& joints, int key, Reach& reach) {
+  std::vector<btCollisionObject*> objects;
+  std::array<int, 2> numbers{-1, -1};
+  btRigidBody *a = &joint.getRigidBodyA(), *b = &joint.getRigidBodyB();
+  for (btRigidBody* body : {a, b})
+    if (body->getBroadphaseHandle())
+      objects.push_back(body);
+    else if (body != &btTypedConstraint::getFixedBody())
+      return;
+  if (count_rows(joint) < 0) return;
+  WorldIsland& island = reach.join(key, objects);
+  if (a->getBroadphaseHandle()) numbers[0] = reach.take_in(*a, true, island);
+  if (b->getBroadphaseHandle()) numbers[1] = reach.take_in(*b, true, island);
+  island.joints.push_back({&joint, numbers[0], numbers[1], joints.joint_of(joint, numbers[0], numbers[1])});
+  island.solver_info = &joints.solver_info();
 }
 
 // Forces of contacts that are there again; and of those that are not the ones that are open by a hair: a box that is

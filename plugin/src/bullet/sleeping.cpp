@@ -12,6 +12,7 @@
 #include "couplings.h"
 #include "held_bodies.h"
 #include "obstacles.h"
+#include "rigid_joints.h"
 #include "world_island.h"
 #include "world_objects.h"
 
@@ -68,9 +69,9 @@ void wait_for_carried(const HeldBody& held, const WorldIsland& island) {
       held.body->setDeactivationTime(0);
 }
 
-void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies,
-                         std::span<btSoftBody* const> listed) {
-  std::vector<std::vector<btCollisionObject*>> groups;
+void keep_awake_together(const Couplings& couplings, const RigidJoints& joints, const Surfaces& surfaces,
+                         const HeldBodies& bodies, std::span<btSoftBody* const> listed) {
+  std::vector<std::vector<btCollisionObject*>> groups = joints.pairs();
   for (const auto& coupling : couplings.all()) {
     if (!coupling->is_complete) continue;
     groups.emplace_back();

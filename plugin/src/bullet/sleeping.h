@@ -9,6 +9,7 @@ class btSoftBody;
 namespace penalty {
 
 class Couplings;
+class RigidJoints;
 class HeldBodies;
 class Surfaces;
 struct HeldBody;
@@ -31,7 +32,7 @@ void wait_for_carried(const HeldBody& held, const WorldIsland& island);
 /// Bodies that are coupled or anchored, or might have touched, sleep together or not at all: while one is restless, those
 /// that want to sleep stay awake, and keep the time that they have been at rest, so that all fall asleep when the last of
 /// them may. `listed`: all soft bodies of the world.
-void keep_awake_together(const Couplings& couplings, const Surfaces& surfaces, const HeldBodies& bodies,
-                         std::span<btSoftBody* const> listed);
+void keep_awake_together(const Couplings& couplings, const RigidJoints& joints, const Surfaces& surfaces,
+                         const HeldBodies& bodies, std::span<btSoftBody* const> listed);
 
 }  // namespace penalty

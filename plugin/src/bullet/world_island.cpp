@@ -42,6 +42,12 @@ void WorldIsland::absorb(WorldIsland& from) {
     contact.b = renumbered[contact.b];
     rigid_contacts.push_back(contact);
   }
+  for (HeldJoint joint : from.joints) {
+    for (int* body : {&joint.a, &joint.b, &joint.joint.a, &joint.joint.b})
+      if (*body >= 0) *body = renumbered[*body];
+    joints.push_back(joint);
+  }
+  if (!solver_info) solver_info = from.solver_info;
   from = {};
 }
 
@@ -84,10 +90,23 @@ void WorldIsland::advance(Real duration, Island& island) {
     coupling->estimated_version = version;
     island.couplings.push_back(&coupling->stepped);
   }
-  penalty::advance(island, duration);
+  const StepReport report = advance_with_joints(duration, island);
   rigid_contacts = island.rigid_contacts;
   impacts = island.impacts;
+  if (!report.finite) joints.clear();
   hand_out(duration, island.records);
+}
+
+StepReport WorldIsland::advance_with_joints(Real duration, Island& island) {
+  island.joints.clear();
+  if (joints.empty()) return penalty::advance(island, duration);
+  for (const HeldJoint& joint : joints) island.joints.push_back(joint.joint);
+  JointRows rows(joints, touched, *solver_info, duration);
+  island.joint_source = &rows;
+  const StepReport report = penalty::advance(island, duration);
+  island.joint_source = nullptr;
+  for (std::size_t k = 0; k < joints.size(); ++k) joints[k].joint = island.joints[k];
+  return report;
 }
 
 // A contact of two soft bodies, be they one, is one of each.

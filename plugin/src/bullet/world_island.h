@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "joint_rows.h"
 #include "penalty/stepping/island.h"
 #include "rigid_bodies.h"
 #include "surfaces.h"
@@ -22,6 +23,8 @@ struct WorldIsland {
   std::vector<HeldPair> surfaces;
   std::vector<RigidContact> rigid_contacts;
   std::vector<Impact> impacts;
+  std::vector<HeldJoint> joints;                     // none after a step that was undone
+  const btContactSolverInfo* solver_info = nullptr;  // of the world, if there are joints
 
   /// Takes in what `from` holds, which is empty afterwards.
   void absorb(WorldIsland& from);
@@ -34,6 +37,7 @@ struct WorldIsland {
   void advance(Real duration, Island& island);
 
  private:
+  StepReport advance_with_joints(Real duration, Island& island);
   void hand_out(Real duration, std::span<const ContactRecord> records);
 };
 

@@ -56,6 +56,7 @@ bool stays_in_range(HeldBody& held) noexcept {
 
 std::span<HeldBody* const> AttachedBodies::World::step(std::span<btSoftBody* const> listed, Real duration,
                                                        bool gravity_applied) noexcept {
+  joints.show();  // what a step before did not come to show
   stepped_.clear();
   to_be_told_of_.clear();
   islands_.clear();
@@ -104,7 +105,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
     }
   Surfaces::wake_touched(*bodies, listed, duration);
   couplings.find_bodies(*bodies, listed);
-  keep_awake_together(couplings, surfaces_, *bodies, listed);
+  keep_awake_together(couplings, joints, surfaces_, *bodies, listed);
   couplings.hold_bodies_of_incomplete();
   for (btSoftBody* body : listed) {
     HeldBody* held = bodies->find(*body);
@@ -119,6 +120,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   }
   rigid_manifolds_.remember(islands_);
   impacts_.remember(islands_);
+  joints.remember(islands_, duration);
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) {
       stepped_.push_back(held);
@@ -168,7 +170,8 @@ void AttachedBodies::World::join_islands(Real duration) {
   std::erase_if(islands_, [](const WorldIsland& island) { return island.held.empty(); });
   surfaces_.join(islands_, *bodies, duration);
   if (!islands_.empty())
-    rigid_manifolds_.add(islands_, *islands_.front().held.front()->body->getWorldInfo(), rigid_bodies_, duration);
+    rigid_manifolds_.add(islands_, *islands_.front().held.front()->body->getWorldInfo(), rigid_bodies_, joints,
+                         duration);
   for (std::size_t i = 0; i < islands_.size(); ++i)
     for (std::size_t j = i + 1; j < islands_.size();)
       if (!islands_[j].held.empty() && islands_[i].shares_a_rigid_body_with(islands_[j])) {
@@ -184,6 +187,7 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
   const auto hold_island = [&](const char* problem) {
     for (HeldBody* held : island.held) held->hold(problem, true);
     island.touched.clear();
+    island.joints.clear();
   };
   shield(
       [&] {

@@ -8,6 +8,7 @@
 #include "held_bodies.h"
 #include "impacts.h"
 #include "rigid_bodies.h"
+#include "rigid_joints.h"
 #include "rigid_manifolds.h"
 #include "rigid_surfaces.h"
 #include "surfaces.h"
@@ -21,6 +22,7 @@ class AttachedBodies::World {
  public:
   std::shared_ptr<HeldBodies> bodies = std::make_shared<HeldBodies>();  // handles look at it, too
   Couplings couplings;
+  RigidJoints joints;
   std::shared_ptr<const ContactCallback> contact_callback;  // null: none so far
 
   /// Steps the attached and active ones of `listed`, all soft bodies of the world, from what their nodes say, together

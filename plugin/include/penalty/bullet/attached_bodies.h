@@ -15,6 +15,7 @@
 #include "penalty/stepping/particles.h"
 #include "penalty/stepping/step_report.h"
 
+class btDiscreteDynamicsWorld;
 class btRigidBody;
 class btSoftBody;
 
@@ -142,6 +143,14 @@ class AttachedBodies {
   /// The field, for changes: targets, stiffnesses, elements switched off. Wakes the body; call it anew for each change.
   /// The field is to be changed, not to be assigned to.
   PotentialField& edit(const btSoftBody& body);
+
+  /// From now on joints (typed constraints) of the world of this solver are in its steps wherever they hold a rigid body
+  /// that a soft one touches, or one that is reached from it by joints and contacts. Their parameters mean what they mean
+  /// in Bullet, for a world step; what they give, what breaks and their feedback are told as Bullet does. Call once, when
+  /// the world is made, and again for the next if the solver outlives this one to serve another: Bullet's bodies do not
+  /// know their joints. Otherwise these stay with Bullet's own solver, which hears once a step of what soft bodies do.
+  /// Constraints of multibodies always do, and joints that are switched off stay off.
+  void take_joints_of(btDiscreteDynamicsWorld& world);
 
   /// Adds a potential over points of several bodies of this solver: particle i of the field is points[i], its rest
   /// positions those of the field. Rigid bodies get the reaction. Returns the number of the coupling. Throws

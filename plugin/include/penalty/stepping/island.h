@@ -102,8 +102,8 @@ struct Island {
   std::vector<SurfaceContact> surfaces = {};
   std::vector<RigidContact> rigid_contacts = {};  // of this step
   std::vector<Joint> joints = {};
-  JointSource* joint_source = nullptr;            // of these joints, if there are any
-  std::vector<Impact> impacts = {};               // pairs that have restitution, by body, other_body, other_rigid
+  JointSource* joint_source = nullptr;  // of these joints, if there are any
+  std::vector<Impact> impacts = {};     // pairs that have restitution, by body, other_body, other_rigid
 
   std::vector<ContactRecord> records = {};  // what pressed in the last step; contacts between rigid bodies left out
 
