@@ -28,6 +28,8 @@ const std::vector<Sequence::Operation>& Sequence::operations() {
                                           {"add rigid body", 2, &Sequence::add_rigid_body, false},
                                           {"remove rigid body", 1, &Sequence::remove_rigid_body, false},
                                           {"change rigid body", 1, &Sequence::change_rigid_body, true},
+                                          {"add rigid joint", 2, &Sequence::add_rigid_joint, false},
+                                          {"remove rigid joint", 1, &Sequence::remove_rigid_joint, false},
                                           {"change masses", 2, &Sequence::change_masses, true},
                                           {"move nodes", 3, &Sequence::move_nodes, true},
                                           {"add forces", 2, &Sequence::add_forces, true},
@@ -45,7 +47,9 @@ const std::vector<Sequence::Operation>& Sequence::operations() {
 
 Sequence::Sequence(std::uint64_t start, bool log) : chance_(start), log_(log) {}
 
-Sequence::~Sequence() = default;
+Sequence::~Sequence() {
+  remove_rigid_joints([](const RigidJoint&) { return true; });
+}
 
 void Sequence::run() {
   const int manner = chance_.index(4);
@@ -303,23 +307,6 @@ void Sequence::edit() {
     PotentialField& field = body->home->penalty().edit(*body->soft);
     for (int k = 0; k < 3; ++k) change_elements(chance_, field);
   });
-}
-
-void Sequence::look_at_everything() {
-  for (const auto& body : bodies_) {
-    if (!body->attached) continue;
-    AttachedBodies& solver = body->home->penalty();
-    attempt("ledger", [&] { solver.ledger(*body->soft); });
-    attempt("forces", [&] { solver.forces(*body->soft); });
-    attempt("flows", [&] { solver.flows(*body->soft).received(); });
-    attempt("refresh", [&] { solver.refresh(*body->soft); });
-    attempt("synchronize", [&] { solver.synchronize(*body->soft); });
-    attempt("report", [&] { solver.report(*body->soft); });
-  }
-  for (const Joint& joint : joints_) {
-    attempt("coupling_energy", [&] { joint.home->penalty().coupling_energy(joint.number); });
-    attempt("coupling_field", [&] { joint.home->penalty().coupling_field(joint.number); });
-  }
 }
 
 void Sequence::switch_fault() {

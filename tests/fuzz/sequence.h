@@ -58,6 +58,10 @@ class Sequence {
     std::vector<const btSoftBody*> soft_bodies;
     std::vector<const btRigidBody*> rigid_bodies;
   };
+  struct RigidJoint {
+    Simulation* home;
+    std::unique_ptr<btTypedConstraint> constraint;
+  };
   struct Books {
     Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();
     Real size = 0;  // sum of the magnitudes [kg m/s]
@@ -85,6 +89,8 @@ class Sequence {
   void add_rigid_body();
   void remove_rigid_body();
   void change_rigid_body();
+  void add_rigid_joint();
+  void remove_rigid_joint();
   void change_masses();
   void move_nodes();
   void add_forces();
@@ -108,6 +114,7 @@ class Sequence {
   void attach(Body& body, RandomField field, const AttachOptions& options);
   void forget_joints(const Body& body);
   void uncouple_all_of(const Body& body);
+  void remove_rigid_joints(const std::function<bool(const RigidJoint&)>& which);
   void one_operation(bool in_callback);
   bool attempt(const char* call, const std::function<void()>& act);  // false: it was refused
   void say(const std::string& text) const;
@@ -131,6 +138,7 @@ class Sequence {
   std::vector<std::unique_ptr<Body>> bodies_;
   std::vector<RigidObject> rigid_;
   std::vector<Joint> joints_;
+  std::vector<RigidJoint> rigid_joints_;
   std::vector<const Simulation*> called_back_;
   int depth_ = 0;     // of steps within steps
   int substeps_ = 0;  // that were taken so far, of all bodies

@@ -5,6 +5,10 @@
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/ConstraintSolver/btGeneric6DofSpring2Constraint.h>
+#include <BulletDynamics/ConstraintSolver/btHingeConstraint.h>
+#include <BulletDynamics/ConstraintSolver/btPoint2PointConstraint.h>
+#include <BulletDynamics/ConstraintSolver/btSliderConstraint.h>
 
 #include "fuzz/sequence.h"
 
@@ -159,8 +163,71 @@ void Sequence::remove_rigid_body() {
       for (int k = soft.m_deformableAnchors.size() - 1; k >= 0; --k)
         if (soft.m_deformableAnchors[k].m_cti.m_colObj == gone.body) soft.m_deformableAnchors.removeAtIndex(k);
     }
+  remove_rigid_joints([&gone](const RigidJoint& joint) {
+    return &joint.constraint->getRigidBodyA() == gone.body || &joint.constraint->getRigidBodyB() == gone.body;
+  });
   gone.home->remove(*gone.body);
   rigid_.erase(rigid_.begin() + number);
+}
+
+// Of any two bodies that move, wherever they are, or of one and the world.
+void Sequence::add_rigid_joint() {
+  if (rigid_.empty() || rigid_joints_.size() > 5) return;
+  const RigidObject &one = chance_.pick(rigid_), &other = chance_.pick(rigid_);
+  if (one.home != other.home || one.body->isStaticOrKinematicObject()) return;
+  const bool to_world = one.body == other.body;
+  btTransform at_one = btTransform::getIdentity(), at_other = at_one;
+  at_one.setOrigin(vector(chance_.uniform(-1, 1), chance_.uniform(-1, 1), 0));
+  at_other.setOrigin(vector(0, chance_.uniform(-1, 1), chance_.uniform(-1, 1)));
+  std::unique_ptr<btTypedConstraint> constraint;
+  switch (chance_.index(4)) {
+    case 0:
+      constraint = to_world ? std::make_unique<btPoint2PointConstraint>(*one.body, at_one.getOrigin())
+                            : std::make_unique<btPoint2PointConstraint>(*one.body, *other.body, at_one.getOrigin(),
+                                                                        at_other.getOrigin());
+      break;
+    case 1: {
+      auto hinge = to_world ? std::make_unique<btHingeConstraint>(*one.body, at_one)
+                            : std::make_unique<btHingeConstraint>(*one.body, *other.body, at_one, at_other);
+      if (chance_.one_in(2)) hinge->setLimit(scalar(chance_.number(-1, 0)), scalar(chance_.number(0, 1)));
+      if (chance_.one_in(2))
+        hinge->enableAngularMotor(true, scalar(chance_.number(-9, 9)), scalar(chance_.uniform(0, 9)));
+      constraint = std::move(hinge);
+      break;
+    }
+    case 2:
+      constraint = to_world ? std::make_unique<btSliderConstraint>(*one.body, at_one, true)
+                            : std::make_unique<btSliderConstraint>(*one.body, *other.body, at_one, at_other, true);
+      break;
+    default: {
+      auto springs = to_world
+                         ? std::make_unique<btGeneric6DofSpring2Constraint>(*one.body, at_one)
+                         : std::make_unique<btGeneric6DofSpring2Constraint>(*one.body, *other.body, at_one, at_other);
+      const int axis = chance_.index(6);
+      springs->setLimit(axis, 1, -1);  // free
+      springs->enableSpring(axis, true);
+      springs->setStiffness(axis, scalar(chance_.uniform(0, 1000)));
+      springs->setDamping(axis, scalar(chance_.uniform(0, 10)));
+      constraint = std::move(springs);
+    }
+  }
+  if (chance_.one_in(3)) constraint->setBreakingImpulseThreshold(scalar(chance_.uniform(0, 10)));
+  one.home->world().addConstraint(constraint.get(), chance_.one_in(2));
+  rigid_joints_.push_back({one.home, std::move(constraint)});
+}
+
+void Sequence::remove_rigid_joint() {
+  if (rigid_joints_.empty()) return;
+  const btTypedConstraint* gone = chance_.pick(rigid_joints_).constraint.get();
+  remove_rigid_joints([gone](const RigidJoint& joint) { return joint.constraint.get() == gone; });
+}
+
+void Sequence::remove_rigid_joints(const std::function<bool(const RigidJoint&)>& which) {
+  std::erase_if(rigid_joints_, [&which](const RigidJoint& joint) {
+    if (!which(joint)) return false;
+    joint.home->world().removeConstraint(joint.constraint.get());
+    return true;
+  });
 }
 
 void Sequence::change_rigid_body() {

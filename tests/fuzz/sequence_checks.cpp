@@ -137,6 +137,29 @@ void Sequence::check_nodes(const Body& body, bool was_sound, bool stepped) const
   }
 }
 
+void Sequence::look_at_everything() {
+  for (const auto& body : bodies_) {
+    if (!body->attached) continue;
+    AttachedBodies& solver = body->home->penalty();
+    attempt("ledger", [&] { solver.ledger(*body->soft); });
+    attempt("forces", [&] { solver.forces(*body->soft); });
+    attempt("flows", [&] { solver.flows(*body->soft).received(); });
+    attempt("refresh", [&] { solver.refresh(*body->soft); });
+    attempt("synchronize", [&] { solver.synchronize(*body->soft); });
+    attempt("report", [&] { solver.report(*body->soft); });
+    attempt("contacts", [&] {
+      for (const BodyContact& contact : solver.contacts(*body->soft))
+        require(contact.impulse.allFinite() && contact.point.allFinite(), "a contact is not finite");
+    });
+  }
+  for (const RigidObject& rigid : rigid_)
+    attempt("contact_force", [&] { rigid.home->penalty().contact_force(*rigid.body); });
+  for (const Joint& joint : joints_) {
+    attempt("coupling_energy", [&] { joint.home->penalty().coupling_energy(joint.number); });
+    attempt("coupling_field", [&] { joint.home->penalty().coupling_field(joint.number); });
+  }
+}
+
 void Sequence::mend() {
   say("mending");
   for (const auto& home : worlds_) {
@@ -146,6 +169,7 @@ void Sequence::mend() {
   fault_ = {};
   for (const Joint& joint : joints_) joint.home->penalty().uncouple(joint.number);
   joints_.clear();
+  remove_rigid_joints([](const RigidJoint&) { return true; });
   for (const RigidObject& rigid : rigid_) rigid.home->remove(*rigid.body);
   rigid_.clear();
   for (const auto& body : bodies_) {
