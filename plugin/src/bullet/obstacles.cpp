@@ -108,11 +108,11 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   for (btCollisionObject* object : obstacles_near(body, box, around)) {
     const btRigidBody* rigid = btRigidBody::upcast(object);
     const Box object_box = bounds_of(*object);
-    const auto [link_velocity, link_spin] = link_velocities(*object);
+    const std::array<Vector3, 2> of_link = link_velocities(*object);  // and its spin
     const Real reach =
-        sweep +
-        (rigid ? reach_of(*rigid, duration)
-               : duration * (link_velocity.norm() + link_spin.norm() * (object_box.high - object_box.low).norm()));
+        sweep + (rigid
+                     ? reach_of(*rigid, duration)
+                     : duration * (of_link[0].norm() + of_link[1].norm() * (object_box.high - object_box.low).norm()));
     if (!object_box.overlaps(box, reach)) continue;
 
     const Pose pose = pose_at_start(*object, duration);
@@ -135,7 +135,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     }
     // That a point will go relative to the object, left to itself.
     const auto way_of = [&](const Vector3& v, const Vector3& x) {
-      Vector3 of_object = link_velocity + link_spin.cross(x - origin);
+      Vector3 of_object = of_link[0] + of_link[1].cross(x - origin);
       if (rigid && !stands_still(*rigid))
         of_object = to_vector(rigid->getVelocityInLocalPoint(to_bullet(Vector3(x - origin))));
       return Vector3(duration * (v - of_object + duration * stepped.gravity));
