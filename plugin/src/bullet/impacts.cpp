@@ -50,8 +50,8 @@ void Impacts::add(WorldIsland& island) const {
   for (const HeldPair& surface : island.surfaces)
     add_pair(surface.a->number, surface.b ? surface.b->number : -1, surface.touched);
   std::ranges::sort(impacts, {}, impact_pair);
-  const auto repeated = std::ranges::unique(impacts, {}, impact_pair);
-  impacts.erase(repeated.begin(), repeated.end());
+  const auto are_one = [](const Impact& a, const Impact& b) { return impact_pair(a) == impact_pair(b); };
+  impacts.erase(std::unique(impacts.begin(), impacts.end(), are_one), impacts.end());
   for (Impact& impact : impacts)
     if (const auto known = last_.find(impact_key(island, impact)); known != last_.end()) {
       const Impact now = impact;
