@@ -166,9 +166,13 @@ void Links::couple(std::span<TouchedRigidBody> touched) {
     groups[first].push_back(k);
   }
   for (const auto& [first, places] : groups) {
+    if (places.size() == 1) {
+      touched[first].articulation->places = places;
+      continue;
+    }
     std::vector<const btMultiBodyLinkCollider*> links;
     for (const int place : places) links.push_back(&link_of(touched[place]));
-    const std::shared_ptr<const Articulation> all = articulation_of(links, places);
+    const std::shared_ptr<Articulation> all = articulation_of(links, places);
     for (std::size_t k = 0; k < places.size(); ++k) {
       TouchedRigidBody& one = touched[places[k]];
       one.articulation = all;

@@ -34,7 +34,7 @@ struct TouchedRigidBody {
   int key;            // unique id of its broadphase proxy
   Box bounds;         // at the start
   RigidBody start, state;
-  std::shared_ptr<const Articulation> articulation;  // of a link that can move
+  std::shared_ptr<Articulation> articulation;  // of a link that can move
 };
 
 /// One step's dealings with Bullet's rigid bodies, and what is expected of them in the next.
