@@ -70,7 +70,9 @@ fi
 step "checking the format"
 bash tests/format.sh
 step "configuring build/$preset"
-cmake --preset "$preset" -D BULLET_PENALTY_BUILD_TESTS=ON -D BULLET_PENALTY_BUILD_DEMOS=ON
+fresh=()  # a build from nothing takes half the time in few sources; one that is there stays as it is
+[ -e "build/$preset" ] || fresh=(-D CMAKE_UNITY_BUILD=ON)
+cmake --preset "$preset" "${fresh[@]}" -D BULLET_PENALTY_BUILD_TESTS=ON -D BULLET_PENALTY_BUILD_DEMOS=ON
 step "building with $jobs jobs"
 cmake --build --preset "$preset" --parallel "$jobs"
 step "$testing"

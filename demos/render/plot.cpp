@@ -13,7 +13,7 @@
 namespace penalty::render {
 namespace {
 
-struct Range {
+struct Extent {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
 
   void add(double v) {
@@ -74,7 +74,7 @@ std::string line(double x0, double y0, double x1, double y1, const char* color) 
 
 std::string svg(const Plot& plot) {
   if (plot.width < 160 || plot.height < 120) throw std::invalid_argument("plot: smaller than 160 x 120");
-  Range x, y;
+  Extent x, y;
   for (const Series& series : plot.series) {
     if (series.x.size() != series.y.size())
       throw std::invalid_argument("plot: series '" + series.name + "' has " + std::to_string(series.x.size()) +

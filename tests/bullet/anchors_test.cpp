@@ -4,8 +4,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Anchors : public WorldTest {
  protected:
   btSoftBody& add_box(const Vector3& at) {

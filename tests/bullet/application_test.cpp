@@ -8,8 +8,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 64;
-
 class Application : public WorldTest {
  protected:
   // Two particles of 0.5 and 2 kg without any force between them: every motion has a closed form.
@@ -34,22 +32,22 @@ class Application : public WorldTest {
 
 TEST_P(Application, ANodesVelocityCanBeSet) {
   btSoftBody& body = add_free_particles();
-  sim.step(frame, 4);
+  sim.step(exact_frame, 4);
   body.m_nodes[0].m_v = btVector3(1, 2, -4);
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 0, Vector3(1, 2, -4) / 4, {1, 2, -4});
   expect_particle(body, 1, {1, 0, 0}, {0, 0, 0});
   body.m_nodes[0].m_v += btVector3(0, 0, 8);
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 0, Vector3(2, 4, 0) / 4, {1, 2, 4});
 }
 
 TEST_P(Application, ANodeCanBeMoved) {
   btSoftBody& body = add_free_particles();
   body.m_nodes[1].m_v = btVector3(0, 1, 0);
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   body.m_nodes[1].m_x += btVector3(0, 0, btScalar(0.5));
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 1, {1, 0.5, 0.5}, {0, 1, 0});
 }
 
@@ -68,18 +66,18 @@ TEST_P(Application, SynchronizeShowsAChangeBeforeTheNextStep) {
 TEST_P(Application, AddForceActsForOneStep) {
   btSoftBody& body = add_free_particles();
   body.addForce(btVector3(0, 0, 64), 0);
-  sim.step(frame);
-  expect_particle(body, 0, {0, 0, 64 * frame * frame / 2 / 0.5}, {0, 0, 2});
+  sim.step(exact_frame);
+  expect_particle(body, 0, {0, 0, 64 * exact_frame * exact_frame / 2 / 0.5}, {0, 0, 2});
   expect_particle(body, 1, {1, 0, 0}, {0, 0, 0});
-  sim.step(frame);
-  expect_particle(body, 0, {0, 0, 1.0 / 64 + 2 * frame}, {0, 0, 2});
+  sim.step(exact_frame);
+  expect_particle(body, 0, {0, 0, 1.0 / 64 + 2 * exact_frame}, {0, 0, 2});
 }
 
 TEST_P(Application, AForceInEveryStepIsAConstantForce) {
   btSoftBody& body = add_free_particles();
   for (int step = 0; step < 64; ++step) {
     body.addForce(btVector3(0, 4, 0), 1);
-    sim.step(frame);
+    sim.step(exact_frame);
   }
   expect_particle(body, 1, {1, 1, 0}, {0, 2, 0});
 }
@@ -88,25 +86,25 @@ TEST_P(Application, GravityFactorScalesGravity) {
   sim.set_gravity({0, -8, 0});
   btSoftBody& body = add_free_particles();
   body.m_gravityFactor = btScalar(0.25);
-  sim.step(frame, 64);
+  sim.step(exact_frame, 64);
   expect_particle(body, 0, {0, -1, 0}, {0, -2, 0});
   body.m_gravityFactor = 0;
-  sim.step(frame, 64);
+  sim.step(exact_frame, 64);
   expect_particle(body, 0, {0, -3, 0}, {0, -2, 0});
 }
 
 TEST_P(Application, AMassOfZeroPinsWhileRunningAndAMassUnpins) {
   sim.set_gravity({0, -8, 0});
   btSoftBody& body = add_free_particles();
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 0, {0, -0.25, 0}, {0, -2, 0});
   body.setMass(0, 0);
   body.m_nodes[0].m_v.setZero();
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 0, {0, -0.25, 0}, {0, 0, 0});
   expect_particle(body, 1, {1, -1, 0}, {0, -4, 0});
   body.setMass(0, btScalar(0.5));
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   expect_particle(body, 0, {0, -0.5, 0}, {0, -2, 0});
 }
 
@@ -115,7 +113,7 @@ TEST_P(Application, APinnedNodeFollowsTheVelocityItIsGiven) {
   btSoftBody& body = add_free_particles();
   body.setMass(1, 0);
   body.m_nodes[1].m_v = btVector3(0, 1, 2);
-  sim.step(frame, 64);
+  sim.step(exact_frame, 64);
   expect_particle(body, 1, {1, 1, 2}, {0, 1, 2});
 }
 
@@ -140,16 +138,16 @@ TEST_P(Application, APinnedBodyHangsOn) {
 
 TEST_P(Application, ChangedMassesCountForTheSubsteps) {
   btSoftBody& body = sim.add_jelly(make_ball(0.25, 2));
-  sim.step(frame);
+  sim.step(exact_frame);
   const int before = sim.penalty().report(body).substeps;
   for (int i = 0; i < body.m_nodes.size(); ++i) body.setMass(i, 100 / body.m_nodes[i].m_im);
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_EQ(sim.penalty().report(body).substeps, before) << "lighter would need more, heavier may keep them";
   sim.penalty().refresh(body);
-  sim.step(frame, 40);
+  sim.step(exact_frame, 40);
   EXPECT_NEAR(sim.penalty().report(body).substeps, before / 10.0, 3);
   for (int i = 0; i < body.m_nodes.size(); ++i) body.setMass(i, btScalar(0.01) / body.m_nodes[i].m_im);
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_NEAR(sim.penalty().report(body).substeps, before, 3);
 }
 
@@ -163,7 +161,7 @@ class Untouched : public Application {
   }
 
   void expect_through() {
-    sim.step(frame, 64);
+    sim.step(exact_frame, 64);
     EXPECT_NEAR(center_of_mass(sim.penalty().particles(*body)).y(), 0.5 - 9.81 / 2, 1e-5);
     EXPECT_EQ(sim.penalty().report(*body).num_contacts, 0);
   }
@@ -173,7 +171,7 @@ class Untouched : public Application {
 };
 
 TEST_P(Untouched, ButNotWithoutAReason) {
-  sim.step(frame, 64);
+  sim.step(exact_frame, 64);
   EXPECT_GT(lowest(*body), 0);
 }
 
@@ -229,7 +227,7 @@ TEST_P(Application, ARigidBodyTakenOutAtTheEndOfAStepIsLeftAlone) {
     take_out = [] {};
   };
   at_end_of_step(sim.world(), take_out);
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   ASSERT_FALSE(box.isInWorld());
   EXPECT_EQ(box.getWorldTransform(), then);
 }
@@ -248,7 +246,7 @@ TEST_P(Application, BodiesDeletedAtTheEndOfAStepAreForgotten) {
     sim.remove(jelly);
   };
   at_end_of_step(sim.world(), remove);
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   EXPECT_EQ(sim.world().getNumCollisionObjects(), GetParam() == WorldKind::classic ? 2 : 3);
   EXPECT_TRUE(sim.penalty().is_attached(other));
   EXPECT_GT(lowest(other), 0.019);
@@ -268,7 +266,7 @@ TEST_P(Application, ASoftBodyTakenOutAtTheEndOfAStepIsLeftAlone) {
     then = taken->m_nodes[1].m_x;
   };
   at_end_of_step(sim.world(), take_out);
-  sim.step(frame, 4);
+  sim.step(exact_frame, 4);
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->m_nodes[1].m_x, then);
 }

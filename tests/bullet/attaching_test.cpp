@@ -6,8 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 64;
-
 class Attaching : public WorldTest {
  protected:
   // A ball with something to do: one node is pulled out.
@@ -31,8 +29,8 @@ TEST_P(Attaching, BodiesThatComeAndGoDoNotDisturbTheOthers) {
     if (step == 15) third = &add_plucked_ball(sim, {5, 0, 0});
     if (step == 20) first = &add_plucked_ball(sim, {-5, 2, 0});
     if (step == 30) sim.remove(*third);
-    sim.step(frame);
-    alone.step(frame);
+    sim.step(exact_frame);
+    alone.step(exact_frame);
     ASSERT_EQ(sim.penalty().particles(watched).positions, alone.penalty().particles(reference).positions) << step;
   }
   EXPECT_LT(center_of_mass(sim.penalty().particles(watched)).y(), -1);
@@ -43,22 +41,22 @@ TEST_P(Attaching, WorksBeforeTheBodyIsInTheWorld) {
   const TetMesh ball = make_ball(0.25, 2);
   auto made = make_soft_body(sim.info(), ball);
   sim.penalty().attach(*made, make_elastic_field(ball.vertices, ball.tetrahedra, 10.0));
-  sim.step(frame, 3);
+  sim.step(exact_frame, 3);
   EXPECT_EQ(made->m_nodes[0].m_x.y(), btScalar(ball.vertices(1, 0))) << "not yet in the world";
   btSoftBody& body = sim.add(std::move(made));
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   EXPECT_NEAR(Real(body.m_nodes[0].m_x.y()), ball.vertices(1, 0) - 9.75 / 16 / 2, 1e-5);
 }
 
 TEST_P(Attaching, ABodyTakenOutOfTheWorldWaits) {
   btSoftBody* body = &add_plucked_ball(sim, {0, 0, 0});
-  sim.step(frame, 10);
+  sim.step(exact_frame, 10);
   const Particles before = sim.penalty().particles(*body);
   std::unique_ptr<btSoftBody> taken = sim.take_out(*body);
-  sim.step(frame, 10);
+  sim.step(exact_frame, 10);
   EXPECT_EQ(sim.penalty().particles(*taken).positions, before.positions);
   body = &sim.add(std::move(taken));
-  sim.step(frame, 10);
+  sim.step(exact_frame, 10);
   EXPECT_NE(sim.penalty().particles(*body).positions, before.positions);
   EXPECT_TRUE(sim.penalty().particles(*body).positions.allFinite());
 }
@@ -66,20 +64,20 @@ TEST_P(Attaching, ABodyTakenOutOfTheWorldWaits) {
 TEST_P(Attaching, DetachingGivesTheBodyBackToBullet) {
   btSoftBody& body = sim.add_jelly(make_ball(0.25, 2));
   for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_v = btVector3(1, 2, 3);
-  sim.step(frame, 10);
+  sim.step(exact_frame, 10);
   ASSERT_TRUE(sim.penalty().is_attached(body));
   sim.penalty().detach(body);
   EXPECT_FALSE(sim.penalty().is_attached(body));
   sim.penalty().detach(body);  // twice does nothing
   const Vector3 before = to_vector(body.m_nodes[7].m_x);
-  sim.step(frame, 16);  // of free nodes, without forces
+  sim.step(exact_frame, 16);  // of free nodes, without forces
   EXPECT_LT((to_vector(body.m_nodes[7].m_x) - before - Vector3(1, 2, 3) / 4).norm(), 1e-5);
   EXPECT_LT((to_vector(body.m_nodes[7].m_v) - Vector3(1, 2, 3)).norm(), 1e-5);
 
   body.m_nodes[7].m_x += btVector3(btScalar(0.03125), 0, 0);
   const TetMesh ball = make_ball(0.25, 2);
   sim.penalty().attach(body, make_elastic_field(ball.vertices, ball.tetrahedra, 10.0), {.step = {.drag = 5}});
-  sim.step(frame, 200);
+  sim.step(exact_frame, 200);
   EXPECT_LT(mean_volume_error(sim.penalty(), body), 1e-3) << "attached again";
 }
 
@@ -91,20 +89,20 @@ TEST_P(Attaching, AFurtherFieldAddsToTheFirst) {
   sim.penalty().attach(twice, make_elastic_field(ball.vertices, ball.tetrahedra, 4.0), options);
   btSoftBody& once = other.add_jelly(ball, {.stiffness = 7, .attach = options});
   for (btSoftBody* body : {&twice, &once}) body->m_nodes[20].m_x += btVector3(btScalar(0.0625), 0, 0);
-  sim.step(frame, 20);
-  other.step(frame, 20);
+  sim.step(exact_frame, 20);
+  other.step(exact_frame, 20);
   EXPECT_EQ(sim.penalty().field(twice).num_elements(), 2 * other.penalty().field(once).num_elements());
   EXPECT_LT((sim.penalty().particles(twice).positions - other.penalty().particles(once).positions).norm(), 1e-9);
 }
 
 TEST_P(Attaching, AFurtherFieldWhileRunningCountsForTheSubsteps) {
   btSoftBody& body = sim.add_jelly(make_ball(0.25, 2));
-  sim.step(frame, 5);
+  sim.step(exact_frame, 5);
   const int before = sim.penalty().report(body).substeps;
   const TetMesh ball = make_ball(0.25, 2);
   sim.penalty().attach(body, make_elastic_field(ball.vertices, ball.tetrahedra, 990.0),
                        {.step = {.integrator = Integrator::explicit_step}});
-  sim.step(frame, 5);
+  sim.step(exact_frame, 5);
   EXPECT_NEAR(sim.penalty().report(body).substeps, 10 * before, 0.2 * 10 * before);  // frequencies grow tenfold
   EXPECT_TRUE(sim.penalty().report(body).finite);
 }
@@ -112,7 +110,7 @@ TEST_P(Attaching, AFurtherFieldWhileRunningCountsForTheSubsteps) {
 TEST_P(Attaching, TwoBodiesHaveFieldsOfTheirOwn) {
   btSoftBody& soft = sim.add_jelly(make_ball(0.25, 2), {.stiffness = 1, .shift = {-1, 0, 0}});
   btSoftBody& stiff = sim.add_jelly(make_ball(0.25, 2), {.stiffness = 100, .shift = {1, 0, 0}});
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_NEAR(sim.penalty().report(stiff).substeps, 10 * sim.penalty().report(soft).substeps, 10);
   EXPECT_NE(&sim.penalty().field(soft), &sim.penalty().field(stiff));
 }
@@ -150,7 +148,7 @@ TEST_P(Attaching, ABodyFromTrianglesOfTheApplicationBounces) {
   sim.penalty().attach(body, field_of_links(body, 5));
   Real low = 1e9;
   for (int step = 0; step < 64; ++step) {
-    sim.step(frame);
+    sim.step(exact_frame);
     ASSERT_TRUE(sim.penalty().report(body).finite);
     low = std::min(low, lowest(body));
   }
@@ -170,7 +168,7 @@ TEST_P(Attaching, AClothOfLinksHangsByItsPinnedCorners) {
   cloth.setMass(10, 0);
   sim.penalty().attach(cloth, field_of_links(cloth, 5), {.step = {.damping_time = 0.01}});
   const btVector3 corner = cloth.m_nodes[0].m_x;
-  sim.step(frame, 256);
+  sim.step(exact_frame, 256);
   EXPECT_EQ(cloth.m_nodes[0].m_x, corner);
   EXPECT_LT(lowest(cloth), 1) << "hangs";
   EXPECT_GT(lowest(cloth), -0.5) << "but is not torn";
@@ -190,7 +188,7 @@ TEST_P(Attaching, BulletsLinksNoLongerActOnAnAttachedBody) {
     bodies.push_back(&s->add(std::move(made)));
     bodies.back()->m_nodes[20].m_x += btVector3(btScalar(0.0625), 0, 0);
     s->penalty().attach(*bodies.back(), make_elastic_field(ball.vertices, ball.tetrahedra, 10.0));
-    s->step(frame, 20);
+    s->step(exact_frame, 20);
   }
   EXPECT_EQ(sim.penalty().particles(*bodies[0]).positions, other.penalty().particles(*bodies[1]).positions);
 }

@@ -9,8 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class ClothAnchors : public WorldTest {
  protected:
   // A level sheet 0.5 m wide, of so many kilograms and as stiff, at a height.

@@ -5,8 +5,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Collision : public WorldTest {
  protected:
   // Steps, watching. Drifts are relative to `momentum_scale`, which is what flies about.

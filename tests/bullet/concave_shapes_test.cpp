@@ -11,8 +11,7 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-constexpr Real pi = 3.14159265358979;
+using std::numbers::pi;
 
 class Concave : public WorldTest {
  protected:

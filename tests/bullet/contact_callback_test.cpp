@@ -7,8 +7,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, g = 9.81;
-
 class ContactCallbacks : public ContactReport {};
 
 TEST_P(ContactCallbacks, TellsWhenContactBeginsAndEnds) {

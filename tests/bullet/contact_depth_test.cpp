@@ -4,8 +4,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, g = 9.81;
-
 class ContactDepth : public ContactReport {};
 
 // The jelly gives way and is led out, so what is below is measured at the end of the step.

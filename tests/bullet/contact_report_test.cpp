@@ -9,8 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, g = 9.81;
-
 Vector3 sum_of(std::span<const BodyContact> contacts) {
   Vector3 sum = Vector3::Zero();
   for (const BodyContact& contact : contacts) sum += contact.impulse;

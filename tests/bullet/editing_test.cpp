@@ -5,8 +5,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Editing : public WorldTest {};
 
 // A field in use is changed, not replaced: the solver keeps what it knows of it.

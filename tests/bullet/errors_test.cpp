@@ -7,8 +7,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-constexpr btScalar nan = std::numeric_limits<btScalar>::quiet_NaN();
 constexpr btScalar infinite = std::numeric_limits<btScalar>::infinity();
 
 template <class Call>

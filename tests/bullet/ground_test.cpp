@@ -6,7 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
 constexpr Real margin = 0.02;
 
 class Ground : public WorldTest {

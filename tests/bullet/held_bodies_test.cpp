@@ -9,8 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-constexpr btScalar nan = std::numeric_limits<btScalar>::quiet_NaN();
 constexpr btScalar inf = std::numeric_limits<btScalar>::infinity();
 
 std::vector<Vector3> places_of(const btSoftBody& body) {

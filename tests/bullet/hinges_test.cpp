@@ -54,8 +54,8 @@ TEST_P(Lid, LiesOnThePadAndItsHinge) {
   const ContactForce pressed = sim.penalty().contact_force(lid);
   const Vector3 arm = center(lid) - hinged_at;
   const Real moment = (pressed.torque + arm.cross(pressed.force)).z();
-  EXPECT_NEAR(moment, 5 * gravity * arm.x(), 0.02 * 5 * gravity * arm.x());
-  EXPECT_NEAR(Real(feedback.m_appliedForceBodyA.y()), 5 * gravity - pressed.force.y(), 0.02 * 5 * gravity);
+  EXPECT_NEAR(moment, 5 * g * arm.x(), 0.02 * 5 * g * arm.x());
+  EXPECT_NEAR(Real(feedback.m_appliedForceBodyA.y()), 5 * g - pressed.force.y(), 0.02 * 5 * g);
 }
 
 TEST_P(Lid, BreaksOffAHingeThatIsTooWeak) {

@@ -9,8 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 // Memory for one soft body after another, with what the last one left in it.
 class Plot {
  public:

@@ -15,7 +15,6 @@ namespace penalty::testing {
 /// Rigid bodies, held by joints, and pads of jelly that they touch.
 class RigidJoints : public WorldTest {
  protected:
-  static constexpr Real frame = 1.0 / 60, gravity = 9.81;
   static btVector3 along_z() { return {0, 0, 1}; }
 
   static btTransform at_point(const Vector3& point) {
@@ -32,7 +31,7 @@ class RigidJoints : public WorldTest {
   ~RigidJoints() override {
     for (const auto& joint : joints_) sim.world().removeConstraint(joint.get());
   }
-  void SetUp() override { sim.set_gravity({0, -gravity, 0}); }
+  void SetUp() override { sim.set_gravity({0, -g, 0}); }
 
   template <class Joint, class... Args>
   Joint& add(Args&&... args) {

@@ -9,7 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
 constexpr Real gravity = 10;
 
 btVector3 vector(Real x, Real y, Real z) { return to_bullet(Vector3(x, y, z)); }

@@ -6,7 +6,7 @@
 namespace penalty::testing {
 namespace {
 
-std::vector<MeshTriangle> triangles_of(const MeshData& data) {
+std::vector<MeshTriangle> contact_triangles_of(const MeshData& data) {
   const MeshShape shape(data, 0);
   std::vector<MeshTriangle> triangles;
   append_triangles(shape, {Vector3::Constant(-100), Vector3::Constant(100)}, triangles);
@@ -15,15 +15,10 @@ std::vector<MeshTriangle> triangles_of(const MeshData& data) {
 
 std::vector<SurfacePoint> planes(const MeshData& data, const MovingPoint& point, Real mesh_margin = 0,
                                  Real reach = 100) {
-  std::vector<MeshTriangle> triangles = triangles_of(data);
+  std::vector<MeshTriangle> triangles = contact_triangles_of(data);
   std::vector<SurfacePoint> found;
   append_planes(triangles, point, mesh_margin, reach, found);
   return found;
-}
-
-Real box_distance(const Vector3& p, const Vector3& half) {
-  const Vector3 q = p.cwiseAbs() - half;
-  return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), Real(0));
 }
 
 TEST(MeshContact, KeepsThePointOnTheSideWhereItIs) {
@@ -114,7 +109,8 @@ TEST(MeshContact, AFenceIsNotInTheWayOfWhatFliesOverIt) {
 }
 
 TEST(MeshContact, TheWayBackIsThroughTheNearestTriangle) {
-  std::vector<MeshTriangle> triangles = triangles_of(box_mesh({1, 1, 1})), sheet = triangles_of(sheet_mesh(1, 1));
+  std::vector<MeshTriangle> triangles = contact_triangles_of(box_mesh({1, 1, 1})),
+                            sheet = contact_triangles_of(sheet_mesh(1, 1));
   std::vector<SurfacePoint> found;
   EXPECT_EQ(append_way_back(triangles, {0.2, 0.9, 0.1}, 0.04, 0.05, found), WayBack::too_far);
   ASSERT_EQ(append_way_back(triangles, {0.2, 0.9, 0.1}, 0.04, 0.5, found), WayBack::found);
@@ -130,7 +126,7 @@ TEST(MeshContact, TheWayBackIsThroughTheNearestTriangle) {
 TEST(MeshContact, ASurfaceHasNoHolesAndNoDoubleEdges) {
   const MeshData sheet = sheet_mesh(1, 1, 4);
   for (const MeshData& mesh : {sheet, sheet.turned(), sheet.with(sheet.turned())}) {
-    const std::vector<MeshTriangle> triangles = triangles_of(mesh);
+    const std::vector<MeshTriangle> triangles = contact_triangles_of(mesh);
     for (int i = -3; i <= 3; ++i)
       for (int k = -3; k <= 3; ++k) {
         const Vector3 above(i * 0.25, 0.5, k * 0.25);

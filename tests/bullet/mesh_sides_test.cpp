@@ -9,8 +9,7 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-constexpr Real pi = 3.14159265358979;
+using std::numbers::pi;
 
 struct Margins {
   Real mesh, soft;
@@ -21,11 +20,6 @@ Vector3 center(const btSoftBody& body) {
   Vector3 sum = Vector3::Zero();
   for (int i = 0; i < body.m_nodes.size(); ++i) sum += to_vector(body.m_nodes[i].m_x);
   return sum / body.m_nodes.size();
-}
-
-Real box_distance(const Vector3& x, const Vector3& half) {
-  const Vector3 q = x.cwiseAbs() - half;
-  return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), Real(0));
 }
 
 void throw_at(Simulation& sim, btSoftBody& body, const Vector3& velocity) {

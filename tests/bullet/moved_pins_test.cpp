@@ -10,8 +10,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 64;
-
 /// A cape: cloth of 1 x 1.5 m that hangs by its upper row.
 class MovedPins : public WorldTest {
  protected:
@@ -38,7 +36,7 @@ class MovedPins : public WorldTest {
   void drive_pins(btSoftBody& cape, const Vector3& shift) const {
     for (const int i : pinned)
       cape.m_nodes[i].m_v =
-          to_bullet(Vector3((cloth.vertices.col(i) + shift - to_vector(cape.m_nodes[i].m_x)) / frame));
+          to_bullet(Vector3((cloth.vertices.col(i) + shift - to_vector(cape.m_nodes[i].m_x)) / exact_frame));
   }
 
   Real longest_edge(const btSoftBody& cape) const {
@@ -59,7 +57,7 @@ TEST_P(MovedPins, ArriveExactlyAndStayThere) {
     move_pins(cape, {x, 0, x / 3});
     const btVector3 wanted = cape.m_nodes[pinned[3]].m_x;
     for (int k = 0; k < 3; ++k) {
-      sim.step(frame);
+      sim.step(exact_frame);
       ASSERT_EQ(cape.m_nodes[pinned[3]].m_x, wanted);
       ASSERT_EQ(cape.m_nodes[pinned[3]].m_v, btVector3(0, 0, 0));
       ASSERT_EQ(sim.penalty().particles(cape).velocities.col(pinned[3]).norm(), 0);
@@ -83,10 +81,10 @@ TEST_P(MovedPins, OfACapeStretchItNoMoreThanPinsThatAreDriven) {
     Real longest_moved = 0, longest_driven = 0;
     int substeps_moved = 0, substeps_driven = 0;
     for (int k = 1; k <= 80; ++k) {
-      move_pins(moved, place(k * frame));
-      drive_pins(driven, place(k * frame));
-      sim.step(frame);
-      other.step(frame);
+      move_pins(moved, place(k * exact_frame));
+      drive_pins(driven, place(k * exact_frame));
+      sim.step(exact_frame);
+      other.step(exact_frame);
       longest_moved = std::max(longest_moved, longest_edge(moved));
       longest_driven = std::max(longest_driven, longest_edge(driven));
       substeps_moved = std::max(substeps_moved, sim.penalty().report(moved).substeps);
@@ -108,7 +106,7 @@ TEST_P(MovedPins, ArePaidForByWhoMovesThem) {
   const Real start = sim.totals().energy;
   for (int k = 1; k <= 64; ++k) {
     move_pins(cape, {0, k / 64.0, 0});
-    sim.step(frame);
+    sim.step(exact_frame);
   }
   const EnergyFlows flows = sim.penalty().flows(cape);
   EXPECT_GT(flows.driving, 0.45 * 9.75) << "lifted by a metre";
@@ -125,18 +123,18 @@ TEST_P(MovedPins, PushABoxAtTheirSpeed) {
   const btRigidBody& box = sim.add_box({0.2, 0.2, 0.4}, 50, {-0.3, 0.35, 0.5});
   for (int k = 1; k <= 32; ++k) {
     for (const int i : options.body.pinned)
-      body.m_nodes[i].m_x = to_bullet(Vector3(block.vertices.col(i) - Vector3(2 * k * frame, 0, 0)));
-    sim.step(frame);
+      body.m_nodes[i].m_x = to_bullet(Vector3(block.vertices.col(i) - Vector3(2 * k * exact_frame, 0, 0)));
+    sim.step(exact_frame);
   }
   EXPECT_NEAR(Real(box.getLinearVelocity().x()), -2, 0.05);
 }
 
 TEST_P(MovedPins, OfABodyThatIsTranslatedJumpWithIt) {
   btSoftBody& cape = add_cape(sim);
-  sim.step(frame, 32);
+  sim.step(exact_frame, 32);
   const Real before = longest_edge(cape);
   cape.translate(btVector3(100, 3, -20));
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_LT(longest_edge(cape), before + 0.05);
   EXPECT_LT(sim.penalty().particles(cape).velocities.colwise().norm().maxCoeff(), 5);
   EXPECT_NEAR(sim.penalty().flows(cape).driving, 0, 1e-12);
@@ -150,18 +148,18 @@ TEST_P(MovedPins, OfABodyThatIsHeldAltogetherJump) {
   btRigidBody& box = sim.add_box({0.2, 0.2, 0.2}, 1, {5, 0.25, 0.5});
   box.setGravity(btVector3(0, 0, 0));
   body.translate(btVector3(10, 0, 0));
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_NEAR(Real(body.m_nodes[0].m_x.x()), 10, 1e-6);
   EXPECT_LT(Real(box.getLinearVelocity().length()), 1e-6) << "was in the way";
 }
 
 TEST_P(MovedPins, JumpIfTheyAreSynchronized) {
   btSoftBody& cape = add_cape(sim);
-  sim.step(frame);
+  sim.step(exact_frame);
   move_pins(cape, {0.25, 0, 0});
   sim.penalty().synchronize(cape);
   EXPECT_EQ(sim.penalty().particles(cape).positions(0, pinned[0]), cloth.vertices(0, pinned[0]) + 0.25);
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_EQ(sim.penalty().flows(cape).driving, 0);
 }
 
@@ -171,17 +169,17 @@ TEST_P(MovedPins, HaveTheVelocityThatTheyWereGivenAgainWhenTheyAreThere) {
   const Vector3 start = to_vector(cape.m_nodes[pin].m_x);
   cape.m_nodes[pin].m_x += btVector3(btScalar(0.015625), 0, 0);
   cape.m_nodes[pin].m_v = btVector3(0, 0, 1);
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_LT((to_vector(cape.m_nodes[pin].m_x) - start - Vector3(0.015625, 0, 0)).norm(), 1e-6);
   EXPECT_EQ(cape.m_nodes[pin].m_v, btVector3(0, 0, 1));
-  sim.step(frame);
-  EXPECT_LT((to_vector(cape.m_nodes[pin].m_x) - start - Vector3(0.015625, 0, frame)).norm(), 1e-6);
+  sim.step(exact_frame);
+  EXPECT_LT((to_vector(cape.m_nodes[pin].m_x) - start - Vector3(0.015625, 0, exact_frame)).norm(), 1e-6);
 }
 
 TEST_P(MovedPins, ThatWereJustPinnedDoNotFlyOn) {
   btSoftBody& cape = add_cape(sim);
   cape.addVelocity(btVector3(btScalar(0.5), 0, 1));
-  sim.step(frame, 2);
+  sim.step(exact_frame, 2);
   int picked = 0;
   for (int i = 0; i < cape.m_nodes.size(); ++i)
     if (cape.m_nodes[i].m_v.length() > cape.m_nodes[picked].m_v.length()) picked = i;
@@ -190,7 +188,7 @@ TEST_P(MovedPins, ThatWereJustPinnedDoNotFlyOn) {
   const btVector3 hand = cape.m_nodes[picked].m_x + btVector3(0, btScalar(0.01), 0);
   for (int k = 0; k < 5; ++k) {
     cape.m_nodes[picked].m_x = hand;
-    sim.step(frame);
+    sim.step(exact_frame);
     ASSERT_EQ(cape.m_nodes[picked].m_x, hand);
     ASSERT_EQ(cape.m_nodes[picked].m_v, btVector3(0, 0, 0));
   }
@@ -198,30 +196,30 @@ TEST_P(MovedPins, ThatWereJustPinnedDoNotFlyOn) {
 
 TEST_P(MovedPins, WakeABodyThatSleeps) {
   btSoftBody& cape = add_cape(sim);
-  sim.step(frame, 8);
+  sim.step(exact_frame, 8);
   let_sleep(cape);
   cape.forceActivationState(ISLAND_SLEEPING);
-  sim.step(frame, 2);
+  sim.step(exact_frame, 2);
   ASSERT_FALSE(cape.isActive());
   const Real before = lowest(cape);
   move_pins(cape, {0, 0.5, 0});
-  sim.step(frame, 16);
+  sim.step(exact_frame, 16);
   EXPECT_TRUE(cape.isActive());
   EXPECT_GT(lowest(cape), before + 0.1);
 }
 
 TEST_P(MovedPins, OfABodyThatCannotBeSteppedAreWhereTheyWerePut) {
   btSoftBody& cape = add_cape(sim);
-  sim.step(frame, 4);
+  sim.step(exact_frame, 4);
   const btScalar lift = cape.m_cfg.kLF;
   cape.m_cfg.kLF = std::numeric_limits<btScalar>::quiet_NaN();
   move_pins(cape, {0.1, 0, 0});
   const btVector3 wanted = cape.m_nodes[pinned[3]].m_x;
-  sim.step(frame, 2);
+  sim.step(exact_frame, 2);
   ASSERT_FALSE(sim.penalty().report(cape).problem.empty());
   EXPECT_EQ(cape.m_nodes[pinned[3]].m_x, wanted);
   cape.m_cfg.kLF = lift;
-  sim.step(frame, 2);
+  sim.step(exact_frame, 2);
   EXPECT_TRUE(sim.penalty().report(cape).problem.empty());
   EXPECT_EQ(cape.m_nodes[pinned[3]].m_x, wanted);
   EXPECT_EQ(cape.m_nodes[pinned[3]].m_v, btVector3(0, 0, 0));

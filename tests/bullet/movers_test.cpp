@@ -6,8 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Movers : public WorldTest {
  protected:
   void SetUp() override { sim.set_gravity({0, -9.81, 0}); }

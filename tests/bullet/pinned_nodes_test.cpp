@@ -6,12 +6,11 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-constexpr Real margin = 0.02;
-
 /// A block 1 m wide and 0.5 m high on the origin, of which the nodes from `height` [m] upwards are pinned.
 class PinnedNodes : public WorldTest {
  protected:
+  static constexpr Real margin = 0.02;
+
   btSoftBody& add_block(Real height) {
     JellyOptions options{.attach = {.step = {.damping_time = 0.002}}};
     for (int i = 0; i < block.vertices.cols(); ++i)

@@ -8,7 +8,7 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 64, none = 2;
+constexpr Real none = 2;
 
 class Queries : public WorldTest {
  protected:
@@ -79,9 +79,9 @@ TEST_P(Queries, RaysFollowABodyThatFallsAndLands) {
   sim.add_ground();
   btSoftBody& body = sim.add_jelly(make_box({1, 0.5, 1}, {3, 2, 3}), {.shift = {0, 1, 0}});
   for (int k = 1; k <= 90; ++k) {
-    sim.step(frame);
+    sim.step(exact_frame);
     if (k <= 20) {
-      const Real top = 1.5 - 9.81 * (k * frame) * (k * frame) / 2;
+      const Real top = 1.5 - 9.81 * (k * exact_frame) * (k * exact_frame) / 2;
       EXPECT_NEAR(hit(body, {0.4, 2, 0.3}, {0.4, -2, 0.3}), (2 - top) / 4, limit(1e-9, 1e-5)) << "frame " << k;
     }
     if (k % 10 == 0) expect_hits(body);
@@ -93,7 +93,7 @@ TEST_P(Queries, RaysFollowABodyThatTurns) {
   for (int i = 0; i < body.m_nodes.size(); ++i)
     body.m_nodes[i].m_v = btVector3(2, 0, 3).cross(body.m_nodes[i].m_x) + btVector3(1, 1, 0);
   for (int k = 0; k < 5; ++k) {
-    sim.step(frame, 8);
+    sim.step(exact_frame, 8);
     expect_hits(body);
   }
 }
@@ -108,14 +108,14 @@ TEST_P(Queries, RaysHitBodiesOfSeveralPieces) {
   for (const auto& [a, b, c, d] : other.tetrahedra)
     pieces.tetrahedra.push_back({first + a, first + b, first + c, first + d});
   btSoftBody& body = sim.add_jelly(pieces);
-  sim.step(frame, 3);
+  sim.step(exact_frame, 3);
   expect_hits(body);
 }
 
 TEST_P(Queries, RaysHitFacesThatWereAdded) {
   btSoftBody& body = sim.add_jelly(make_box({1, 0.5, 1}, {1, 1, 1}));
   for (int k = 0; k < 40; ++k) body.appendFace(0, 1, 6);
-  sim.step(frame);
+  sim.step(exact_frame);
   expect_hits(body);
 }
 
@@ -126,7 +126,7 @@ TEST_P(Queries, RaysPassBodiesWithoutFaces) {
   Eigen::Matrix3Xd rest(3, rope.m_nodes.size());
   for (int i = 0; i < rope.m_nodes.size(); ++i) rest.col(i) = to_vector(rope.m_nodes[i].m_x);
   sim.penalty().attach(rope, PotentialField(rest));
-  sim.step(frame);
+  sim.step(exact_frame);
   EXPECT_EQ(hit(rope, {0.5, 1, 0}, {0.5, -1, 0}), none);
 }
 
@@ -149,7 +149,7 @@ TEST_P(Queries, ContactAndSweepTestsReturn) {
     btCollisionWorld::ClosestConvexResultCallback swept(from.getOrigin(), to.getOrigin());
     sim.world().convexSweepTest(&ball, from, to, swept);
     EXPECT_FALSE(swept.hasHit()) << "sweeps see no soft bodies";
-    sim.step(frame);
+    sim.step(exact_frame);
   }
   EXPECT_EQ(count.count, 0) << "nor has Bullet manifolds for them";
   EXPECT_TRUE(sim.penalty().report(body).finite);
@@ -175,7 +175,7 @@ class Flags : public WorldTest {
             body.appendLink(body.m_faces[k].m_n[i], body.m_faces[k].m_n[(i + 1) % 3], nullptr, true);
       if (flags & btSoftBody::fCollision::CL_SS) body.generateClusters(4);
     }
-    of.step(frame, 60);
+    of.step(exact_frame, 60);
     std::vector<btVector3> positions;
     for (const btSoftBody* body : bodies)
       for (int i = 0; i < body->m_nodes.size(); ++i) positions.push_back(body->m_nodes[i].m_x);

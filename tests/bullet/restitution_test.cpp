@@ -9,7 +9,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, g = 9.81;
 const Material rubber{.young = 1e7, .poisson = 0.35, .density = 1000, .damping = 0.002};
 
 /// A body made of a material, its lowest point at a height above y = 0.

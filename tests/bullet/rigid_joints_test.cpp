@@ -35,7 +35,7 @@ TEST_P(RigidJoints, ASpringAndAPadCarryAPlate) {
   }
   const Real pressed = sim.penalty().contact_force(plate).force.y();
   EXPECT_GT(pressed, 10) << "the pad carries some of it";
-  EXPECT_NEAR(rest - center(plate).y(), (mass * gravity - pressed) / stiffness, 1e-4);
+  EXPECT_NEAR(rest - center(plate).y(), (mass * g - pressed) / stiffness, 1e-4);
 }
 
 // The same hung on it alone, with a soft sheet on top that weighs what is known.
@@ -54,7 +54,7 @@ TEST_P(RigidJoints, ASpringIsStretchedByTheWeightItCarries) {
   sim.add_jelly(make_box({1, 0.2, 1}, {5, 1, 5}),
                 {.shift = {0, 0.075, 0}, .body = {.mass = 2}, .attach = {.step = {.damping_time = 0.02}}});
   sim.step(frame, 400);
-  EXPECT_NEAR(-center(plate).y(), (mass + 2) * gravity / stiffness, 3e-4);
+  EXPECT_NEAR(-center(plate).y(), (mass + 2) * g / stiffness, 3e-4);
 }
 
 // Nothing acts from outside. Cubes, so that Bullet's gyroscopic term is nothing.
@@ -184,7 +184,7 @@ TEST_P(RigidJoints, OfEveryKindHold) {
 TEST_P(RigidJoints, WhatNoSoftBodyTouchesIsBulletsToTheLastBit) {
   const auto run = [](Solver solver) {
     Simulation own(GetParam(), solver);
-    own.set_gravity({0, -gravity, 0});
+    own.set_gravity({0, -g, 0});
     if (solver == Solver::penalty) own.add_jelly(make_ball(0.3, 1), {.shift = {50, 0, 0}});
     btRigidBody& a = own.add_box({0.3, 0.1, 0.1}, 2, {0, 0, 0});
     btRigidBody& b = own.add_box({0.3, 0.1, 0.1}, 1, {0.8, 0, 0});

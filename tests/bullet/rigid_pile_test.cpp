@@ -6,12 +6,12 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, gravity = 9.81, margin = 0.02;
-
 class RigidPile : public WorldTest {
  protected:
+  static constexpr Real margin = 0.02;
+
   void SetUp() override {
-    sim.set_gravity({0, -gravity, 0});
+    sim.set_gravity({0, -g, 0});
     sim.add_ground();
   }
 
@@ -45,7 +45,9 @@ class RigidPile : public WorldTest {
       const Real now = sim.totals().energy;
       EXPECT_LT(now - energy, 1e-3 * energy) << "frame " << k;
       energy = now;
-      if (k >= 180) EXPECT_LT(depth_below(body, *boxes[0], lowest_half), 0.003) << "frame " << k;
+      if (k >= 180) {
+        EXPECT_LT(depth_below(body, *boxes[0], lowest_half), 0.003) << "frame " << k;
+      }
     }
     for (const btRigidBody* box : boxes) {
       EXPECT_GT(Real(box->getWorldTransform().getBasis()[1][1]), 0.998) << "tilted";
@@ -101,7 +103,7 @@ TEST_P(RigidPile, ALightBallIsNotSwallowedByAHeavySoftBoxOnIt) {
   for (const Real mass : {0.1, 1.0}) {
     SCOPED_TRACE(mass);
     Simulation own(GetParam());
-    own.set_gravity({0, -gravity, 0});
+    own.set_gravity({0, -g, 0});
     own.add_ground();
     const TetMesh box = make_box({1, 0.6, 1}, {8, 5, 8});
     const btSoftBody& body =
@@ -143,7 +145,7 @@ TEST_P(OnAPlate, ACubeThatSlidesIsBrakedByCoulombsFrictionOnce) {
   cube.setLinearVelocity(btVector3(2, 0, 0));
   sim.step(frame, 12);
   const Real braked = 2 - Real(cube.getLinearVelocity().x() - plate.getLinearVelocity().x());
-  EXPECT_NEAR(braked, 0.3 * gravity * 0.2, 0.1 * 0.3 * gravity * 0.2);
+  EXPECT_NEAR(braked, 0.3 * g * 0.2, 0.1 * 0.3 * g * 0.2);
 }
 
 TEST_P(OnAPlate, ABallBouncesWithItsRestitution) {
@@ -160,14 +162,14 @@ TEST_P(OnAPlate, ABallBouncesWithItsRestitution) {
   }
   // The plate trembles; in the step of the impact there was gravity.
   const Real of_plate = Real(plate.getLinearVelocity().y());
-  EXPECT_NEAR((after - of_plate) / (of_plate - before + gravity * frame), 0.8, 0.03);
+  EXPECT_NEAR((after - of_plate) / (of_plate - before + g * frame), 0.8, 0.03);
 }
 
 // Of one body, since Bullet steps several in an order that depends on whatever else is in the world.
 TEST_P(RigidPile, WhatTouchesNoSoftBodyMovesAsInStockBullet) {
   const auto run = [&](Solver solver) {
     Simulation own(GetParam(), solver);
-    own.set_gravity({0, -gravity, 0});
+    own.set_gravity({0, -g, 0});
     own.add_ground();
     const TetMesh mesh = moved(make_box({1, 0.6, 1}, {3, 2, 3}), {20, 0.021, 0});
     btSoftBody& body = own.add(make_soft_body(own.info(), mesh, SoftBodyOptions{}));

@@ -13,15 +13,12 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real pi = 3.14159265358979;
-constexpr Real margin = 0.02;
-
-Matrix3 turned(Real angle, const Vector3& axis) {
-  return Eigen::AngleAxis<Real>(angle, axis.normalized()).toRotationMatrix();
-}
+using std::numbers::pi;
 
 class Landing : public WorldTest {
  protected:
+  static constexpr Real margin = 0.02;
+
   // `top`: height of the shape above its origin where the ball comes down.
   void land(std::unique_ptr<btCollisionShape> shape, const Matrix3& rotation, Real top) {
     sim.set_gravity({0, -9.81, 0});

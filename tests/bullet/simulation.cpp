@@ -6,6 +6,15 @@ void penalty::demo::PrintTo(WorldKind kind, std::ostream* out) { *out << testing
 
 namespace penalty::testing {
 
+Matrix3 turned(Real angle, const Vector3& axis) {
+  return Eigen::AngleAxis<Real>(angle, axis.normalized()).toRotationMatrix();
+}
+
+Real box_distance(const Vector3& point, const Vector3& half_extents) {
+  const Vector3 beyond = point.cwiseAbs() - half_extents;
+  return beyond.cwiseMax(0).norm() + std::min(beyond.maxCoeff(), Real(0));
+}
+
 std::string world_name(WorldKind kind) {
   return std::string(kind == WorldKind::classic ? "classic" : "deformable") + (double_bullet ? "_float64" : "_float");
 }

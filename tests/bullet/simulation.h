@@ -7,6 +7,7 @@
 #include <BulletSoftBody/btSoftBody.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 #include <ostream>
 #include <vector>
@@ -31,9 +32,18 @@ using demo::WorldKind;
 using Solver = demo::SoftSolver;
 
 inline constexpr bool double_bullet = sizeof(btScalar) == sizeof(double);
+inline constexpr btScalar nan = std::numeric_limits<btScalar>::quiet_NaN();
+inline constexpr Real frame = 1.0 / 60;        // [s]
+inline constexpr Real exact_frame = 1.0 / 64;  // sums of it are exact [s]
+inline constexpr Real g = 9.81;                // [m/s²]
 
 /// The limit that holds in this build of Bullet.
 inline Real limit(Real in_double, Real in_float) { return double_bullet ? in_double : in_float; }
+
+Matrix3 turned(Real angle, const Vector3& axis);
+
+/// Of a point from a box about the origin, negative within.
+Real box_distance(const Vector3& point, const Vector3& half_extents);
 
 std::string world_name(WorldKind kind);  // "classic_float64"
 

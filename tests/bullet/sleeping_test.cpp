@@ -6,8 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Sleeping : public WorldTest {
  protected:
   void SetUp() override {

@@ -21,8 +21,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 // How deep a point lies in a mesh of tetrahedra: its distance from the boundary, zero outside [m].
 class Depth {
  public:
@@ -57,8 +55,6 @@ class Depth {
   std::vector<Triangle> boundary_;
   const PackedVectors& positions_;
 };
-
-Matrix3 turned(Real angle, const Vector3& axis) { return Eigen::AngleAxis<Real>(angle, axis).toRotationMatrix(); }
 
 std::unique_ptr<btCollisionShape> box_of(Real half) {
   return std::make_unique<btBoxShape>(to_bullet(Vector3(half, half, half)));

@@ -12,8 +12,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class SoftContact : public WorldTest {
  protected:
   btSoftBody& add_jelly(const TetMesh& mesh, const JellyOptions& options) {
@@ -313,9 +311,9 @@ TEST_P(SleepingInContact, WhatIsThrownAtASleeperHitsIt) {
 
 INSTANTIATE_TEST_SUITE_P(Worlds, SleepingInContact, deformable_world(), param_name);
 
-class Depth : public WorldTest {};
+class DeepStart : public WorldTest {};
 
-TEST_P(Depth, AgainstWhatCannotMoveCostsNoSubsteps) {
+TEST_P(DeepStart, AgainstWhatCannotMoveCostsNoSubsteps) {
   const TetMesh box = make_box({0.5, 0.5, 0.5}, {4, 4, 4});
   const auto most_substeps = [&](Real height, Real lift) {
     Simulation other(GetParam());
@@ -344,7 +342,7 @@ TEST_P(Depth, AgainstWhatCannotMoveCostsNoSubsteps) {
     EXPECT_LE(most_substeps(0.0201, lift), 2 * at_rest) << "the ground comes up by " << lift << " m";
 }
 
-INSTANTIATE_TEST_SUITE_P(Worlds, Depth, both_worlds(), param_name);
+INSTANTIATE_TEST_SUITE_P(Worlds, DeepStart, both_worlds(), param_name);
 
 }  // namespace
 }  // namespace penalty::testing

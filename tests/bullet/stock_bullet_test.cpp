@@ -13,8 +13,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 class Squashed : public WorldTest {
  protected:
   // A box of Bullet's own tetrahedra, of full volume stiffness, squashed to a fifth of its height.

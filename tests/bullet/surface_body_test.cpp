@@ -7,8 +7,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 /// A sheet of 1 kg, its plane turned level, at height y.
 TriangleSurface level_sheet(int cells, Real y) {
   TriangleSurface sheet = make_sheet(1, 1, cells, cells);

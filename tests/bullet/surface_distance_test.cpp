@@ -17,11 +17,6 @@ namespace {
 
 using Distance = std::function<Real(const Vector3&)>;  // signed, negative inside
 
-Real box_distance(const Vector3& p, const Vector3& half) {
-  const Vector3 q = p.cwiseAbs() - half;
-  return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), Real(0));
-}
-
 // Of the convex solid that the polyline, from axis to axis, sweeps about the y axis; outward is to its right.
 Real revolved_distance(const Vector3& p, const std::vector<Eigen::Vector2d>& profile) {
   const Eigen::Vector2d q(std::hypot(p.x(), p.z()), p.y());

@@ -28,7 +28,7 @@ SceneOptions box(Start start, std::uint32_t seed = 1) {
 }
 
 /// Steps for `duration` [s]; false as soon as something is not finite.
-bool run(Scene& scene, Real duration) {
+bool run_finite(Scene& scene, Real duration) {
   for (int step = 0; step < std::lround(duration / frame); ++step) {
     scene.step(frame);
     if (!scene.report().finite) return false;
@@ -43,7 +43,7 @@ TEST_P(Recovery, FromEveryStartWithinFiveSeconds) {
       SCOPED_TRACE(std::string(name_of(start)) + ", seed " + std::to_string(seed));
       const auto scene = make("recover", box(start, seed));
       ASSERT_TRUE(scene->is_free());
-      ASSERT_TRUE(run(*scene, 5));
+      ASSERT_TRUE(run_finite(*scene, 5));
       EXPECT_EQ(scene->report().integrator, Integrator::implicit_step);
       // In double within 1e-6 by then; asked is 1e-2 now and 1e-6 after twenty seconds.
       EXPECT_LT(rest_error(*scene), 1e-6);
@@ -56,7 +56,7 @@ TEST_P(Recovery, FromEveryStartWithinFiveSeconds) {
 
 TEST_P(Recovery, OfTheSequenceOfAllStarts) {
   const auto scene = make("recover", {.mesh = "box", .cells = 4});
-  ASSERT_TRUE(run(*scene, 16.1));
+  ASSERT_TRUE(run_finite(*scene, 16.1));
   EXPECT_EQ(fact(*scene, "starts"), 8);
   EXPECT_EQ(fact(*scene, "recovered_starts"), 8);
   EXPECT_LT(fact(*scene, "worst_rest_error"), recovered_below);
@@ -68,7 +68,7 @@ TEST_P(Recovery, WithTheExplicitStepToo) {
   options.cells = 3;
   options.integrator = Integrator::explicit_step;
   const auto scene = make("recover", options);
-  ASSERT_TRUE(run(*scene, 5));
+  ASSERT_TRUE(run_finite(*scene, 5));
   EXPECT_EQ(scene->report().integrator, Integrator::explicit_step);
   EXPECT_LT(rest_error(*scene), recovered_below);
 }
@@ -82,7 +82,7 @@ TEST_P(Recovery, OfStiffBulkNeedsTwoPhases) {
       options.poisson = 0.45;
       options.phases = phases;
       const auto scene = make("recover", options);
-      ASSERT_TRUE(run(*scene, 5));
+      ASSERT_TRUE(run_finite(*scene, 5));
       recovered[phases] += rest_error(*scene) < recovered_below;
     }
   EXPECT_EQ(recovered[1], 0);
@@ -104,7 +104,7 @@ TEST_P(Recovery, NeverShowsMoreEnergyThanItsStart) {
 TEST_P(Recovery, ComesToTheSameBitsInEveryThread) {
   const auto hash_after_a_second = [this](std::uint32_t seed) {
     const auto scene = make("recover", box(Start::scramble, seed));
-    run(*scene, 1);
+    run_finite(*scene, 1);
     return hash_of(scene->particles().positions);
   };
   const std::uint64_t first = hash_after_a_second(1), second = hash_after_a_second(2);

@@ -15,8 +15,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real degree = std::numbers::pi / 180;
-
 // Tetrahedra reached from the first through faces.
 std::size_t reached_through_faces(const TetMesh& mesh) {
   std::map<std::array<int, 3>, std::vector<int>> faces;
@@ -52,8 +50,8 @@ void expect_lawful(const EmbeddedSurface& e) {
   EXPECT_EQ(e.lattice.repairs.dropped_vertices, 0);
   const MeshQuality q = quality(e.lattice);
   EXPECT_NEAR(q.edge_ratio, 2 / std::numbers::sqrt3, 1e-9);
-  EXPECT_NEAR(q.smallest_dihedral, 60 * degree, 1e-9);
-  EXPECT_NEAR(q.largest_dihedral, 90 * degree, 1e-9);
+  EXPECT_NEAR(q.smallest_dihedral, std::numbers::pi / 3, 1e-9);
+  EXPECT_NEAR(q.largest_dihedral, std::numbers::pi / 2, 1e-9);
 }
 
 TEST(Embed, ObeysItsLawsForBallsBoxesAndTori) {

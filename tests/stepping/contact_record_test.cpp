@@ -7,15 +7,15 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, angle = std::numbers::pi / 6, mass = 2;
-const Vector3 gravity = 10 * Vector3(std::sin(angle), -std::cos(angle), 0);  // on a slope of 30 degrees
+constexpr Real angle = std::numbers::pi / 6, mass = 2;
+const Vector3 slope_gravity = 10 * Vector3(std::sin(angle), -std::cos(angle), 0);  // on a slope of 30 degrees
 
 // A particle that starts at rest on y = 0; `touch` adds what it lies on.
 template <class Touch>
 void expect_weight_on_slope(Real friction, Real height, const Touch& touch) {
   SCOPED_TRACE(friction);
   Body point = make_free_particles(Eigen::Matrix3Xd(Vector3(0, height, 0)), {mass});
-  point.body.gravity = gravity;
+  point.body.gravity = slope_gravity;
   for (int k = 0; k < 20; ++k) {
     Island island;
     island.bodies = {&point.body};
@@ -26,7 +26,7 @@ void expect_weight_on_slope(Real friction, Real height, const Touch& touch) {
     const ContactRecord& record = island.records.front();
     EXPECT_EQ(record.body, 0);
     EXPECT_LT((record.normal - Vector3(0, 1, 0)).norm(), 1e-12);
-    const Vector3 given = mass * (point.velocity(0) - before - frame * gravity);
+    const Vector3 given = mass * (point.velocity(0) - before - frame * slope_gravity);
     EXPECT_LT((record.impulse - given).norm(), 1e-13);
     EXPECT_EQ(record.slides, friction < std::tan(angle)) << "step " << k;
     EXPECT_NEAR(record.gap, 0, 1e-12);

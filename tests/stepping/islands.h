@@ -7,6 +7,9 @@
 
 namespace penalty::testing {
 
+inline constexpr Real frame = 1.0 / 60;  // [s]
+inline constexpr Real g = 9.81;          // [m/s²]
+
 /// A stepped body together with the field that it needs, and the contacts of its next step.
 struct Body {
   std::unique_ptr<PotentialField> field;

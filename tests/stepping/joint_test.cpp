@@ -6,7 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60, gravity = 9.81;
 constexpr Real unlimited = JointRow::unlimited;
 
 // Balls and axles, by where they are in the frames of their bodies.
@@ -121,7 +120,7 @@ struct JointedIsland {
 
 RigidBody falling_ball(Real mass, const Vector3& position) {
   RigidBody body = make_sphere(mass, 0.3, position);
-  body.acceleration = Vector3(0, -gravity, 0);
+  body.acceleration = Vector3(0, -g, 0);
   return body;
 }
 
@@ -131,8 +130,8 @@ TEST(Joint, APendulumSwingsInItsPeriodAndKeepsItsEnergy) {
   s.island.rigid_bodies = {falling_ball(2, {length * std::sin(tilt), -length * std::cos(tilt), 0})};
   s.particle.body.options.substeps = 20;
   s.add_ball(0, -1, Vector3::Zero());
-  const Real start = s.energy(), swing = 2 * gravity * length * (1 - std::cos(tilt));
-  const Real rate = std::sqrt(gravity * length / (length * length + 0.4 * radius * radius)) * (1 - tilt * tilt / 16);
+  const Real start = s.energy(), swing = 2 * g * length * (1 - std::cos(tilt));
+  const Real rate = std::sqrt(g * length / (length * length + 0.4 * radius * radius)) * (1 - tilt * tilt / 16);
   for (int k = 1; k <= 600; ++k) {
     s.step();
     EXPECT_NEAR(s[0].position.x(), tilt * length * std::cos(rate * k * frame), 2e-3 * tilt) << k;
@@ -252,7 +251,7 @@ TEST(Joint, ASpringIsStretchedByTheWeightAndSwingsInItsPeriod) {
   s.particle.body.options.substeps = 40;
   s.island.rigid_bodies = {falling_ball(mass, Vector3::Zero())};
   s.add({.a = 0, .b = -1, .at_a = Vector3::Zero(), .at_b = Vector3::Zero(), .stiffness = stiffness});
-  const Real sag = mass * gravity / stiffness, rate = std::sqrt(stiffness / mass);
+  const Real sag = mass * g / stiffness, rate = std::sqrt(stiffness / mass);
   for (int k = 1; k <= 240; ++k) {
     s.step();
     EXPECT_NEAR(s[0].position.y(), -sag * (1 - std::cos(rate * k * frame)), 1e-2 * sag) << k;
@@ -260,7 +259,7 @@ TEST(Joint, ASpringIsStretchedByTheWeightAndSwingsInItsPeriod) {
 }
 
 TEST(Joint, BreaksWhereARowHasToGiveMoreThanItsStrength) {
-  const Real mass = 2, weight = mass * gravity;
+  const Real mass = 2, weight = mass * g;
   for (const Real share : {0.9, 1.1}) {
     JointedIsland s;
     s.island.rigid_bodies = {falling_ball(mass, Vector3::Zero())};

@@ -4,8 +4,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 // Particles that fall on what is under them.
 struct Falling {
   Body body;

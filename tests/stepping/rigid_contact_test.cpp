@@ -6,8 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 RigidBody cube(Real mass, Real size, const Vector3& position, const Vector3& velocity = Vector3::Zero()) {
   RigidBody body;
   body.position = position;

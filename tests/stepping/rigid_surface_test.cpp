@@ -10,8 +10,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 Eigen::Matrix3Xd corners_of_triangle() {
   Eigen::Matrix3Xd x(3, 3);
   x << -1, 1, 0, 0, 0, 0, std::sqrt(3.0) / 3, std::sqrt(3.0) / 3, -2 * std::sqrt(3.0) / 3;

@@ -8,8 +8,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
-
 Matrix3 turned(Real angle, const Vector3& axis) { return Eigen::AngleAxis<Real>(angle, axis.normalized()).matrix(); }
 
 // A triangle and what falls on it: particles without forces between them.

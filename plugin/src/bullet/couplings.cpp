@@ -107,8 +107,8 @@ void Couplings::wake(const HeldCoupling& coupling) {
 
 void Couplings::find_bodies(const HeldBodies& bodies, std::span<btSoftBody* const> listed) {
   if (couplings_.empty() && waking_.empty()) return;
-  const auto held = std::find_if(listed.begin(), listed.end(), [&](btSoftBody* body) { return bodies.find(*body); });
-  const WorldObjects objects(held == listed.end() ? nullptr : (*held)->getWorldInfo()->m_broadphase);
+  const auto known = std::find_if(listed.begin(), listed.end(), [&](btSoftBody* body) { return bodies.find(*body); });
+  const WorldObjects objects(known == listed.end() ? nullptr : (*known)->getWorldInfo()->m_broadphase);
   const auto find = [&](HeldPoint& point) {
     HeldBody* const held = bodies.find(point.name);
     point.soft = held && bodies.is_listed(*held) ? held : nullptr;
