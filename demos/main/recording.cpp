@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "main/readable.h"
-#include "scenes/element_energy.h"
+#include "scenes/unbroken_triangles.h"
 
 namespace penalty::demo {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <map>
 
-#include "scenes/element_energy.h"
 #include "scenes/scene_setup.h"
+#include "scenes/unbroken_triangles.h"
 
 namespace penalty::demo {
 namespace {

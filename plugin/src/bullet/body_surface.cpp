@@ -1,6 +1,8 @@
 // The surface with which a soft body touches.
 #include "penalty/bullet/body_surface.h"
 
+#include <algorithm>
+
 #include "held_bodies.h"
 #include "penalty/mesh/embed.h"
 #include "surfaces.h"
@@ -8,12 +10,25 @@
 namespace penalty {
 namespace {
 
+// Those none of whose corners lies in what broke.
+std::vector<Triangle> whole_triangles(const BodySurface& surface, const PotentialField& field) {
+  const BrokenElements broken(field);
+  std::vector<Triangle> triangles = surface.triangles;
+  std::erase_if(triangles, [&](const Triangle& corners) {
+    return std::any_of(corners.begin(), corners.end(), [&](int corner) {
+      const WeightedPoint& point = surface.points[corner];
+      return broken.cut({point.particles.data(), static_cast<std::size_t>(point.size)});
+    });
+  });
+  return triangles;
+}
+
 // Its own if it has one, faces if there are any, else links, else nodes.
 std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
   const btSoftBody& body = *held.body;
   const PackedVectors& rest = held.field.rest_positions();
   if (const BodySurface& own = held.options.surface; !own.points.empty())
-    return std::make_shared<ContactSurface>(own.points, own.triangles, std::vector<Edge>{}, rest);
+    return std::make_shared<ContactSurface>(own.points, whole_triangles(own, held.field), std::vector<Edge>{}, rest);
   std::vector<int> point_of(body.m_nodes.size(), -1);
   std::vector<WeightedPoint> points;
   const auto point_at = [&](const btSoftBody::Node* node) {
@@ -28,12 +43,15 @@ std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
   std::vector<Edge> edges;
   for (int k = 0; k < body.m_faces.size(); ++k) {
     const auto& n = body.m_faces[k].m_n;
+    if (n[0] == n[1]) continue;  // torn
     triangles.push_back({point_at(n[0]), point_at(n[1]), point_at(n[2])});
   }
-  if (triangles.empty())
+  for (const auto& [face, corners] : held.torn_faces.torn())
+    for (const int i : corners) point_at(&body.m_nodes[i]);
+  if (body.m_faces.size() == 0)
     for (int k = 0; k < body.m_links.size(); ++k)
       edges.push_back({point_at(body.m_links[k].m_n[0]), point_at(body.m_links[k].m_n[1])});
-  if (triangles.empty() && edges.empty())
+  if (points.empty())
     for (int i = 0; i < body.m_nodes.size(); ++i) point_at(&body.m_nodes[i]);
   return std::make_shared<ContactSurface>(std::move(points), std::move(triangles), edges, rest);
 }

@@ -25,6 +25,12 @@ void HeldBody::read_nodes(Real duration) {
   stale = stale || changes.lighter;  // heavier particles only leave the estimate too high
 }
 
+void HeldBody::let_torn_faces_go() {
+  if (!torn_faces.update(*body, field)) return;
+  surface.reset();
+  mesh_sides.forget();
+}
+
 void HeldBody::measure() {
   const Particles& particles = stepped.particles;
   box = {};

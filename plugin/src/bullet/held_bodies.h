@@ -14,6 +14,7 @@
 #include "penalty/contact/box.h"
 #include "penalty/contact/contact_surface.h"
 #include "penalty/stepping/island.h"
+#include "torn_faces.h"
 
 namespace penalty {
 
@@ -47,6 +48,7 @@ struct HeldBody {
   std::shared_ptr<ContactSurface> surface;  // made when it is needed first,
   std::array<int, 2> surface_size{};        // of so many faces and links
   MeshSides mesh_sides;                     // of its points
+  TornFaces torn_faces;
   std::shared_ptr<BodyContacts> contacts = std::make_shared<BodyContacts>();  // who is told of them may detach the body
   int listed = 0;  // step in which the world last had the body; 0: none so far
 
@@ -65,6 +67,9 @@ struct HeldBody {
 
   /// Adds what others changed to the state; pinned nodes that were moved go there in `duration` [s], see Nodes::read.
   void read_nodes(Real duration = 0);
+
+  /// Lets the faces go that what broke in the step held, and their contact with them.
+  void let_torn_faces_go();
 
   /// Finds the box and the largest speed, once for all who ask where the body may come in the step.
   void measure();

@@ -27,6 +27,10 @@ void shield(const Call& call, const Failed& failed) noexcept {
   }
 }
 
+void set_problem(StepReport& report, const char* what) noexcept {
+  shield([&] { report.problem = what; }, [](const char*) {});
+}
+
 void set_problem(StepReport& report, const char* what, int particle, const char* then) noexcept {
   shield([&] { report.problem = what + std::to_string(particle) + then; },
          [&](const char*) { report.problem = "not finite"; });
@@ -124,6 +128,7 @@ void AttachedBodies::World::step_all(std::span<btSoftBody* const> listed, Real d
   for (btSoftBody* body : listed)
     if (HeldBody* held = bodies->find(*body); held && held->outcome == StepOutcome::stepped) {
       stepped_.push_back(held);
+      shield([&] { held->let_torn_faces_go(); }, [&](const char* what) { set_problem(held->stepped.report, what); });
       if (contact_callback && held->contacts->are_news()) to_be_told_of_.push_back(held->identity());
     }
 }
@@ -206,7 +211,7 @@ void AttachedBodies::World::advance(WorldIsland& island, Real duration) noexcept
       set_problem(report, "the step did not stay finite and was undone; look at particle ", report.first_bad_particle,
                   "");
     } else if (held->left_out) {
-      shield([&] { report.problem = held->left_out; }, [](const char*) {});
+      set_problem(report, held->left_out);
     }
     report_rejected(*held);
   }

@@ -1,0 +1,108 @@
+#include "torn_faces.h"
+
+#include <BulletSoftBody/btSoftBody.h>
+
+#include <algorithm>
+#include <set>
+
+#include "convert.h"
+#include "penalty/fields/batch.h"
+#include "penalty/kinds/stable_neo_hookean.h"
+#include "penalty/kinds/tetrahedron_volume.h"
+
+namespace penalty {
+namespace {
+
+using Node = btSoftBody::Node;
+
+template <std::size_t N>
+std::array<int, N> numbers_of(const btSoftBody& body, Node* const (&nodes)[N]) {
+  std::array<int, N> numbers;
+  for (std::size_t k = 0; k < N; ++k) numbers[k] = static_cast<int>(nodes[k] - &body.m_nodes[0]);
+  return numbers;
+}
+
+template <std::size_t N>
+std::array<int, N> sorted(std::array<int, N> numbers) {
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+std::set<Triangle> sorted_all(const std::vector<Triangle>& triangles) {
+  std::set<Triangle> keys;
+  for (const Triangle& t : triangles) keys.insert(sorted(t));
+  return keys;
+}
+
+// Those of the body, or, of one that has none, those that the field is made of.
+std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field) {
+  std::vector<Tetrahedron> tetrahedra;
+  for (int k = 0; k < body.m_tetras.size(); ++k) tetrahedra.push_back(numbers_of(body, body.m_tetras[k].m_n));
+  if (!tetrahedra.empty()) return tetrahedra;
+  std::set<Tetrahedron> known;
+  const auto add = [&](const auto* batch) {
+    if (!batch) return;
+    for (const Tetrahedron& t : batch->stencils())
+      if (known.insert(sorted(t)).second) tetrahedra.push_back(t);
+  };
+  for (const auto& potential : field.potentials()) {
+    add(dynamic_cast<const Batch<TetrahedronVolume>*>(potential.get()));
+    add(dynamic_cast<const Batch<StableNeoHookean>*>(potential.get()));
+  }
+  return tetrahedra;
+}
+
+void append_face(btSoftBody& body, const Triangle& corners, const PackedVectors& rest) {
+  btSoftBody::Face face;
+  face.m_tag = nullptr;
+  face.m_material = body.m_faces.size() > 0 ? body.m_faces[0].m_material : body.m_materials[0];
+  for (int k = 0; k < 3; ++k) face.m_n[k] = &body.m_nodes[corners[k]];
+  const Vector3 a = rest.col(corners[0]).head<3>(), b = rest.col(corners[1]).head<3>(),
+                c = rest.col(corners[2]).head<3>();
+  face.m_ra = static_cast<btScalar>((b - a).cross(c - a).norm());  // as Bullet has it: without the half
+  const btVector3 normal = btCross(face.m_n[1]->m_x - face.m_n[0]->m_x, face.m_n[2]->m_x - face.m_n[0]->m_x);
+  face.m_normal = normal.fuzzyZero() ? btVector3(0, 0, 0) : normal.normalized();
+  face.m_leaf = nullptr;
+  face.m_pcontact = btVector4(0, 0, 0, 0);
+  face.m_n0 = face.m_n1 = face.m_vn = btVector3(0, 0, 0);
+  face.m_index = body.m_faces.size();
+  body.m_faces.push_back(face);
+}
+
+}  // namespace
+
+bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
+  const BreakCount count = count_breaks(field);
+  if (count == count_) return false;
+  const BrokenElements broken(field);
+  const std::vector<Tetrahedron> tetrahedra = tetrahedra_of(body, field);
+  std::vector<Tetrahedron> whole;
+  for (const Tetrahedron& t : tetrahedra)
+    if (!broken.cut(t)) whole.push_back(t);
+  const std::vector<Triangle> inner = faces_of(tetrahedra), bare = boundary_faces(whole);
+  const std::set<Triangle> bare_keys = sorted_all(bare), skin_keys = sorted_all(boundary_faces(tetrahedra));
+
+  std::vector<Triangle> faces;  // of the body, when nothing is torn
+  for (int k = 0; k < body.m_faces.size(); ++k) faces.push_back(numbers_of(body, body.m_faces[k].m_n));
+  for (const auto& [face, corners] : torn_) faces[face] = corners;
+  std::vector<Torn> torn;
+  for (int k = 0; k < static_cast<int>(faces.size()); ++k) {
+    const Triangle key = sorted(faces[k]);
+    const bool is_of_tetrahedron = std::binary_search(inner.begin(), inner.end(), key);
+    if (is_of_tetrahedron ? !bare_keys.contains(key) : broken.cut(faces[k])) torn.push_back({k, faces[k]});
+  }
+  std::set<Triangle> known_keys = sorted_all(faces);
+  known_keys.insert(skin_keys.begin(), skin_keys.end());
+
+  for (const auto& [face, corners] : torn_)
+    for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[k]];
+  for (const auto& [face, corners] : torn)
+    for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[0]];
+  for (const Triangle& face : bare)
+    if (!known_keys.contains(sorted(face))) append_face(body, face, field.rest_positions());
+  torn_ = std::move(torn);
+  count_ = count;
+  return true;
+}
+
+}  // namespace penalty

@@ -1,0 +1,58 @@
+#include "penalty/fields/broken_elements.h"
+
+#include <algorithm>
+
+#include "penalty/fields/element_batch.h"
+
+namespace penalty {
+namespace {
+
+template <class Visit>
+void for_each_broken(const PotentialField& field, const Visit& visit) {
+  for (const auto& potential : field.potentials())
+    if (const auto* batch = dynamic_cast<const ElementBatch*>(potential.get()); batch && !batch->breaks().empty())
+      visit(*batch);
+}
+
+std::vector<int> broken_in(const ElementBatch& batch) {
+  std::vector<int> elements;
+  for (const Break& event : batch.breaks())
+    if (!batch.is_enabled(event.element)) elements.push_back(event.element);
+  std::sort(elements.begin(), elements.end());
+  elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
+  return elements;
+}
+
+}  // namespace
+
+BreakCount count_breaks(const PotentialField& field) {
+  BreakCount count;
+  for_each_broken(field, [&](const ElementBatch& batch) {
+    count.ever += batch.breaks().size();
+    for (const Break& event : batch.breaks()) count.now += !batch.is_enabled(event.element);
+  });
+  return count;
+}
+
+BrokenElements::BrokenElements(const PotentialField& field) : stencils_of_(field.num_particles()) {
+  for_each_broken(field, [&](const ElementBatch& batch) {
+    const std::vector<int> broken = broken_in(batch);
+    num_broken_ += broken.size();
+    batch.visit_elements(field.rest_positions(), [&](const ElementView& element) {
+      if (std::binary_search(broken.begin(), broken.end(), element.number))
+        stencils_of_[element.stencil.front()].emplace_back(element.stencil.begin(), element.stencil.end());
+    });
+  });
+}
+
+bool BrokenElements::cut(std::span<const int> particles) const {
+  const auto is_among = [&](int i) { return std::find(particles.begin(), particles.end(), i) != particles.end(); };
+  return !empty() && std::any_of(particles.begin(), particles.end(), [&](int first) {
+    const auto& stencils = stencils_of_[first];
+    return std::any_of(stencils.begin(), stencils.end(), [&](const std::vector<int>& stencil) {
+      return std::all_of(stencil.begin(), stencil.end(), is_among);
+    });
+  });
+}
+
+}  // namespace penalty
