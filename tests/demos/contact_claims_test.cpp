@@ -56,6 +56,17 @@ TEST_P(ContactClaims, NothingInTheBowlIsInsideAnythingElse) {
   EXPECT_EQ(fact(*scene, "escaped"), 0);
 }
 
+TEST_P(ContactClaims, AClothThatFallsFoldedLiesOnItselfInLayers) {
+  const auto scene = make("fold", {.cells = 12});
+  run(*scene, 2);
+  const Real kept = fact(*scene, "kept_distance"), least = fact(*scene, "least_distance");
+  EXPECT_EQ(fact(*scene, "self_crossings"), 0) << "in no frame";
+  EXPECT_GT(least, 0.5 * kept);
+  EXPECT_LT(least, kept) << "layers do touch";
+  EXPECT_EQ(scene->penetration(), 0) << "into ball or floor";
+  EXPECT_LT(scene->particles().positions.row(1).minCoeff(), 2 * margin) << "some lies on the floor";
+}
+
 TEST_P(ContactClaims, FrictionHoldsOneRingAndLetsTheOtherSlide) {
   const auto scene = make("incline", {.cells = 14});
   run(*scene, 2.4);
