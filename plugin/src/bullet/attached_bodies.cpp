@@ -83,7 +83,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
     held = &bodies.add(body, std::move(field), options);
   }
   keep_face_tree(body);
-  return {attached_->bodies, body, held->serial, penalty::unused_settings(body)};
+  return {attached_->bodies, body, held->serial, penalty::unused_settings(body, held->largest_margin)};
 }
 
 void AttachedBodies::detach(const btSoftBody& body) {

@@ -54,7 +54,7 @@ void update_constants(btSoftBody& body) {
   body.updateConstants();
 }
 
-std::vector<std::string> unused_settings(const btSoftBody& body) {
+std::vector<std::string> unused_settings(const btSoftBody& body, Real largest_margin) {
   const btSoftBody::Config& config = body.m_cfg;
   struct Setting {
     const char* name;
@@ -81,6 +81,9 @@ std::vector<std::string> unused_settings(const btSoftBody& body) {
     if (s.value != s.none)
       unused.push_back(std::string(s.name) + " is " + to_text(Real(s.value)) + " and does nothing: " + s.instead);
   if (body.m_clusters.size() > 0) unused.emplace_back("clusters do nothing: the surface of the body touches");
+  if (const Real margin = body.getCollisionShape()->getMargin(); margin > largest_margin)
+    unused.push_back("the collision margin is " + to_text(margin) +
+                     ", more than a quarter of the size of the body: " + to_text(largest_margin) + " is kept");
   return unused;
 }
 

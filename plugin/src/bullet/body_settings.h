@@ -20,7 +20,8 @@ void add_forces_of_settings(btSoftBody& body, Real duration);
 /// Areas, link constants and rest lengths, if Bullet asks for them anew.
 void update_constants(btSoftBody& body);
 
-/// Settings that ask for something, and get nothing, while the body is attached: a line each, with what to use instead.
-std::vector<std::string> unused_settings(const btSoftBody& body);
+/// Settings that ask for something, and get nothing, while the body is attached, or less, as a margin of more than
+/// `largest_margin` [m]: a line each, with what to use instead.
+std::vector<std::string> unused_settings(const btSoftBody& body, Real largest_margin);
 
 }  // namespace penalty

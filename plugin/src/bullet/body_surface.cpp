@@ -74,7 +74,7 @@ ContactSurface& surface_of(HeldBody& held) {
     held.surface = make_surface(held);
     held.surface_size = size;
   }
-  held.surface->margin = held.body->getCollisionShape()->getMargin();
+  held.surface->margin = held.margin();
   held.surface->friction = held.body->m_cfg.kDF;
   return *held.surface;
 }

@@ -1,20 +1,37 @@
 #include "held_bodies.h"
 
+#include <BulletSoftBody/btSoftBody.h>
+
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 namespace penalty {
+namespace {
+
+// A quarter of the diagonal: what is held further away than its own size is no body any more, but a cloud of points.
+Real largest_margin_of(const Positions& rest) {
+  constexpr Real share = 0.25;
+  const auto points = rest.topRows<3>();
+  const Real size = points.cols() == 0 ? 0 : (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).norm();
+  return size > 0 ? share * size : std::numeric_limits<Real>::infinity();
+}
+
+}  // namespace
 
 HeldBody::HeldBody(btSoftBody& soft_body, PotentialField potential_field, const AttachOptions& attach_options)
     : body(&soft_body),
       serial(give_serial(soft_body)),
       field(std::move(potential_field)),
       options(attach_options),
+      largest_margin(largest_margin_of(field.rest_positions())),
       nodes(soft_body, stepped.particles) {
   stepped.field = &field;
   stepped.options = options.step;
   start = stepped.particles.positions;
 }
+
+Real HeldBody::margin() const { return std::min<Real>(body->getCollisionShape()->getMargin(), largest_margin); }
 
 void HeldBody::read_nodes(Real duration) {
   const NodeChanges changes = nodes.read(stepped.particles, duration);

@@ -41,6 +41,7 @@ struct HeldBody {
   std::uint64_t order = 0;  // in which the bodies of the solver were attached; no two have the same
   PotentialField field;
   AttachOptions options;
+  Real largest_margin;  // that the size of the body allows [m]
   SteppedBody stepped;
   Nodes nodes;
   bool stale = true;                        // the stability estimate is to be made anew
@@ -64,6 +65,9 @@ struct HeldBody {
   Real fastest2 = 0;    // and the square of their largest speed [m²/s²]: see `measure`
 
   Identity identity() const { return {body, serial}; }
+
+  /// The distance that it keeps from others [m].
+  Real margin() const;
 
   /// Adds what others changed to the state; pinned nodes that were moved go there in `duration` [s], see Nodes::read.
   void read_nodes(Real duration = 0);

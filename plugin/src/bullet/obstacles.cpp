@@ -93,7 +93,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   held.mesh_sides.begin_step();
   if (!body.hasContactResponse()) return true;
 
-  const Real margin = body.getCollisionShape()->getMargin();
+  const Real margin = held.margin();
   const Real fall = stepped.gravity.norm() * duration * duration;
   const Box& box = held.box;
   const Real fastest = std::sqrt(held.fastest2);

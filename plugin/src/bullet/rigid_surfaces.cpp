@@ -2,6 +2,9 @@
 
 #include <BulletSoftBody/btSoftBody.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "convert.h"
 #include "held_bodies.h"
 #include "surfaces.h"
@@ -11,6 +14,7 @@ namespace {
 
 constexpr Real stretch = 1.5;        // of edges that is reckoned with
 constexpr Real negligible = 0.05;    // share of the margin that a ball may sink in between nodes
+constexpr Real least_margin = 0.01;  // share of the mean edge: surfaces keep that much in any case
 constexpr Real padding_share = 0.5;  // of the size of a box, that is searched about it for triangles
 
 // A large ball sinks no deeper in between the nodes than l² / 6R, l the longest edge: the nodes do.
@@ -33,6 +37,7 @@ RigidSurfaces::Object& RigidSurfaces::refreshed(const HeldBody& held, const btCo
   const btCollisionShape& shape = *object.getCollisionShape();
   const bool is_of_triangles = is_concave(shape);
   Object& known = objects_[{is_of_triangles ? held.order : 0, object.getBroadphaseHandle()->m_uniqueId}];
+  if (known.used != step_) known.margin = std::numeric_limits<Real>::infinity();
   known.used = step_;
   const bool is_covered =
       !is_of_triangles || (known.covered.contains(box.low, 0) && known.covered.contains(box.high, 0));
@@ -54,10 +59,11 @@ std::vector<SurfacePair*> RigidSurfaces::near(HeldBody& held, const btCollisionO
   const Matrix3 to_object = to_matrix(object.getWorldTransform().getBasis()).transpose();
   const Box local = transformed(box, to_object, -(to_object * to_vector(object.getWorldTransform().getOrigin())));
   Object& known = refreshed(held, object, local);
+  known.margin = std::min(known.margin, std::max(soft.margin, least_margin * soft.mean_edge()));
   for (std::size_t k = 0; k < known.edges.size(); ++k) {
     if (!known.edges[k].reach_into(local) || !are_needed(known.edges[k], soft)) continue;
     const std::shared_ptr<ContactSurface>& rigid = known.surfaces[k];
-    rigid->margin = soft.margin;
+    rigid->margin = known.margin;
     rigid->friction = object.getFriction();
     Pair& pair = pairs_[{held.order, static_cast<std::uint64_t>(object.getBroadphaseHandle()->m_uniqueId), k}];
     pair.used = step_;

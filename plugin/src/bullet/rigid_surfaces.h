@@ -31,6 +31,7 @@ class RigidSurfaces {
     Box covered = {};  // in the frame of the object, that of a concave one has been searched
     std::vector<ShapeEdges> edges = {};
     std::vector<std::shared_ptr<ContactSurface>> surfaces = {};
+    Real margin = 0;  // least of the soft bodies that are near in this step [m]
     int used = 0;
   };
   struct Pair {

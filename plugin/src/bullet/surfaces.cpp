@@ -42,8 +42,7 @@ Extent extent_of(const HeldBody& held, std::span<const TouchedRigidBody> touched
   Real fastest = std::sqrt(fastest2);
   for (const TouchedRigidBody& t : touched) fastest = std::max(fastest, t.start.velocity.norm());
   return {.box = held.box,
-          .way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration +
-                 Real(held.body->getCollisionShape()->getMargin())};
+          .way = fastest * duration + (stepped.gravity.norm() + pushed) * duration * duration + held.margin()};
 }
 
 // As the nodes say, which the application may have changed.
@@ -56,8 +55,7 @@ Extent extent_of_nodes(const HeldBody& held, Real duration) {
     fastest2 = std::max(fastest2, Real(body.m_nodes[i].m_v.length2()));
   }
   const Real gravity = Real(body.m_worldInfo->m_gravity.length()) * std::abs(Real(body.m_gravityFactor));
-  extent.way = std::sqrt(fastest2) * duration + gravity * duration * duration +
-               Real(held.body->getCollisionShape()->getMargin());
+  extent.way = std::sqrt(fastest2) * duration + gravity * duration * duration + held.margin();
   return extent;
 }
 

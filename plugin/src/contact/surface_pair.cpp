@@ -7,11 +7,12 @@
 namespace penalty {
 namespace {
 
-constexpr Real largest_thickness = 0.3, smallest_thickness = 1e-3;  // share of the mean edge of the finer surface
-constexpr Real rest_share = 0.8;     // of the distance at rest, that features of one surface keep at most
-constexpr Real refresh_ahead = 1.5;  // motions of a drift that near pairs must leave before they are found anew,
-constexpr Real room_ahead = 3;       // and of these, how many near pairs hold after that
-constexpr Real least_room = 0.5;     // of the thickness
+constexpr Real largest_thickness = 0.3, smallest_thickness = 0.01;  // share of the mean edge of the finer surface
+constexpr Real apart_at_rest = 1e-3;  // likewise: features of one surface that are nearer lie on each other
+constexpr Real rest_share = 0.8;      // of the distance at rest, that features of one surface keep at most
+constexpr Real refresh_ahead = 1.5;   // motions of a drift that near pairs must leave before they are found anew,
+constexpr Real room_ahead = 3;        // and of these, how many near pairs hold after that
+constexpr Real least_room = 0.5;      // of the thickness
 constexpr Real least_ahead = 0.5, most_ahead = 0.5;  // a search looks ahead: share of the thickness, of the mean edge
 constexpr Real coplanar = 1e-13;  // volume of four points that counts as none, relative to their distances cubed
 
@@ -260,7 +261,7 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
       q.is_measured = true;
     }
     // What lies on each other at rest, as doubled vertices do, is no contact.
-    if (q.at_refresh >= q.thickness + c.room || q.thickness < smallest_thickness * edge_) continue;
+    if (q.at_refresh >= q.thickness + c.room || q.thickness < apart_at_rest * edge_) continue;
     c.near.push_back(q);
     for (const FeaturePair& old : pressed_)
       if (old.points == q.points && old.are_edges == q.are_edges && old.from_b == q.from_b)
