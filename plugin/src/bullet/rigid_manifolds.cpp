@@ -6,6 +6,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <BulletSoftBody/btSoftBody.h>
@@ -13,9 +14,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "convert.h"
 #include "obstacles.h"
@@ -28,6 +29,7 @@ namespace penalty {
 namespace {
 
 constexpr Real same_point = 0.05, most_same_point = 0.02;  // share of the size of a body, and Bullet's distance [m]
+constexpr Real same_normal = 0.99;                         // cosine, for balls, which have no points
 
 Real size_of(const btCollisionObject& object) {
   const Box box = bounds_of(object);
@@ -88,21 +90,40 @@ class Owners {
 struct Point {
   const btCollisionObject *a, *b;
   btVector3 on_a, on_b, normal;  // the latter from b to a
-  btScalar friction, restitution;
+  btScalar friction = 0, restitution = 0, rolling = 0, spinning = 0;
+
+  static Point between(const btCollisionObject* a, const btCollisionObject* b, const btVector3& on_a,
+                       const btVector3& on_b, const btVector3& normal) {
+    return {a,
+            b,
+            on_a,
+            on_b,
+            normal,
+            btManifoldResult::calculateCombinedFriction(a, b),
+            btManifoldResult::calculateCombinedRestitution(a, b),
+            btManifoldResult::calculateCombinedRollingFriction(a, b),
+            btManifoldResult::calculateCombinedSpinningFriction(a, b)};
+  }
+  // What the application made of it, when it was told of a new point.
+  void take_settings(const btManifoldPoint& point) {
+    friction = point.m_combinedFriction;
+    restitution = point.m_combinedRestitution;
+    rolling = point.m_combinedRollingFriction;
+    spinning = point.m_combinedSpinningFriction;
+  }
 };
 
-// All points that an algorithm finds, of which a manifold would keep four: too few for the corners of two boxes.
+// All points that an algorithm finds, of which a manifold would keep four: too few for the corners of two boxes. They go
+// into no manifold: the dispatcher, which is about to find them in the same places, tells the application of each once.
 class AllPoints final : public btManifoldResult {
  public:
   AllPoints(const btCollisionObjectWrapper& one, const btCollisionObjectWrapper& two, std::vector<Point>& points)
       : btManifoldResult(&one, &two), points_(points) {}
 
   void addContactPoint(const btVector3& normal, const btVector3& on_b, btScalar distance) override {
-    btManifoldResult::addContactPoint(normal, on_b, distance);
     if (!m_manifoldPtr || distance > m_manifoldPtr->getContactBreakingThreshold()) return;
     const btCollisionObject *a = m_body0Wrap->getCollisionObject(), *b = m_body1Wrap->getCollisionObject();
-    points_.push_back({a, b, on_b + normal * distance, on_b, normal, calculateCombinedFriction(a, b),
-                       calculateCombinedRestitution(a, b)});
+    points_.push_back(Point::between(a, b, on_b + normal * distance, on_b, normal));
   }
 
  private:
@@ -133,11 +154,12 @@ void add_remembered(btPersistentManifold& manifold, std::vector<Point>& points) 
     btManifoldPoint& point = manifold.getContactPoint(k);
     point.m_appliedImpulse = point.m_appliedImpulseLateral1 = point.m_appliedImpulseLateral2 = 0;
     const btVector3& on_a = point.getPositionWorldOnA();
-    if (std::none_of(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(found), [&](const Point& p) {
-          return on_a.distance(p.a == manifold.getBody0() ? p.on_a : p.on_b) < same;
-        }))
-      points.push_back({manifold.getBody0(), manifold.getBody1(), on_a, point.getPositionWorldOnB(),
-                        point.m_normalWorldOnB, point.m_combinedFriction, point.m_combinedRestitution});
+    if (std::any_of(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(found),
+                    [&](const Point& p) { return on_a.distance(p.a == manifold.getBody0() ? p.on_a : p.on_b) < same; }))
+      continue;
+    points.push_back(
+        {manifold.getBody0(), manifold.getBody1(), on_a, point.getPositionWorldOnB(), point.m_normalWorldOnB});
+    points.back().take_settings(point);
   }
 }
 
@@ -152,9 +174,8 @@ void append_corners(const btCollisionObject& a, const btCollisionObject& b, Real
       append_surface_points(*b.getCollisionShape(), to_vector(of_b.invXform(at)), reach + edges.radius, found);
       for (const SurfacePoint& nearest : found) {
         const btVector3 normal = of_b.getBasis() * to_bullet(nearest.normal);
-        points.push_back({&a, &b, at - normal * static_cast<btScalar>(edges.radius), of_b * to_bullet(nearest.point),
-                          normal, btManifoldResult::calculateCombinedFriction(&a, &b),
-                          btManifoldResult::calculateCombinedRestitution(&a, &b)});
+        points.push_back(Point::between(&a, &b, at - normal * static_cast<btScalar>(edges.radius),
+                                        of_b * to_bullet(nearest.point), normal));
       }
     }
 }
@@ -170,21 +191,41 @@ void add_ahead(const btCollisionObject& one, const btCollisionObject& two, Real 
   append_corners(two, one, reach, points);
 }
 
+// Zero: it is no ball.
+Real radius_of(const btCollisionObject& object) {
+  const btCollisionShape& shape = *object.getCollisionShape();
+  return shape.getShapeType() == SPHERE_SHAPE_PROXYTYPE ? Real(static_cast<const btSphereShape&>(shape).getRadius())
+                                                        : 0;
+}
+
+// A ball touches with whatever it has turned down: it is the first of the two.
+void put_ball_first(Point& point) {
+  if (radius_of(*point.a) > 0 || !(radius_of(*point.b) > 0)) return;
+  std::swap(point.a, point.b);
+  std::swap(point.on_a, point.on_b);
+  point.normal = -point.normal;
+}
+
 // In the frames of the bodies, from where the point was found: not where a kinematic one starts.
 RigidContact contact_of(const Point& point, int a, int b) {
   const btTransform &of_a = point.a->getWorldTransform(), &of_b = point.b->getWorldTransform();
+  const Real radius = radius_of(*point.a);
   return {.a = a,
           .b = b,
-          .anchor_a = to_vector(of_a.invXform(point.on_a)),
+          .anchor_a = radius > 0 ? Vector3::Zero() : to_vector(of_a.invXform(point.on_a)),
           .anchor_b = to_vector(of_b.invXform(point.on_b)),
           .normal = to_vector(of_b.getBasis().transpose() * point.normal),
+          .radius = radius,
           .friction = Real(point.friction),
-          .restitution = Real(point.restitution)};
+          .restitution = Real(point.restitution),
+          .rolling = std::max<Real>(point.rolling, 0),
+          // Bullet does not ask for it where nothing rolls.
+          .spinning = point.rolling > 0 ? std::max<Real>(point.spinning, 0) : 0};
 }
 
 bool is_finite(const RigidContact& contact) {
   return (contact.anchor_a + contact.anchor_b + contact.normal).allFinite() &&
-         std::isfinite(contact.friction + contact.restitution);
+         std::isfinite(contact.friction + contact.restitution + contact.rolling + contact.spinning);
 }
 
 }  // namespace
@@ -258,7 +299,8 @@ void RigidManifolds::add_contacts(btBroadphasePair& pair, btCollisionDispatcher&
   WorldIsland& island = reach.join(key, objects);
   const std::array numbers{reach.take_in(*objects[0], false, island), reach.take_in(*objects[1], false, island)};
   std::vector<RigidContact> contacts;
-  for (const Point& point : points) {
+  for (Point& point : points) {
+    put_ball_first(point);
     const bool swapped = point.a != objects[0];
     const RigidContact contact = contact_of(point, numbers[swapped], numbers[!swapped]);
     if (is_finite(contact)) contacts.push_back(contact);
@@ -303,11 +345,15 @@ void RigidManifolds::recall(std::span<const TouchedRigidBody> touched, Real size
       contact.b = b;
       RigidContact* again = nullptr;
       for (std::size_t k = 0; k < found; ++k)
-        if (contacts[k].a == a && (contacts[k].anchor_a - contact.anchor_a).norm() < same) again = &contacts[k];
+        if (contacts[k].a == a && (contacts[k].anchor_a - contact.anchor_a).norm() < same &&
+            (contact.radius == 0 || contacts[k].normal.dot(contact.normal) > same_normal))
+          again = &contacts[k];
       if (again) {
         again->force = contact.force;
+        again->moment = contact.moment;
         continue;
       }
+      if (contact.radius > 0) continue;
       const Vector3 offset =
           of_a.position + of_a.rotation * contact.anchor_a - of_b.position - of_b.rotation * contact.anchor_b;
       const Vector3 normal = of_b.rotation * contact.normal;

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "contact_rules.h"
 #include "particle_contacts.h"
 
 namespace penalty {

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "particle_contacts.h"
+#include "contact_rules.h"
 
 namespace penalty {
 namespace {

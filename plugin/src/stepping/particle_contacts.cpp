@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "contact_rules.h"
+
 namespace penalty {
 namespace {
 
@@ -87,9 +89,7 @@ void ParticleContacts::begin(Real h, Real since) {
     if (row.is_held() && row.is_obstacle) continue;
     has_held_ = has_held_ || row.is_held();
     row.is_driven = has_held_particle(point, particles);
-    if (-gap <= contact.deepest)
-      row.recovery =
-          std::clamp<Real>((-gap - row.body->options.contact_slop) / std::max(recovery_time, h), 0, recovery_speed);
+    if (-gap <= contact.deepest) row.recovery = recovery_of(-gap, row.body->options.contact_slop, h);
     if (row.recovery > 0 && !row.is_obstacle && !row.is_held())
       row.recovery =
           std::min(row.recovery, std::max<Real>(row.normal.dot(relative_velocity(row)), 0) + recovery_acceleration * h);
@@ -132,10 +132,8 @@ void ParticleContacts::begin_attempt() {
 Vector3 ParticleContacts::into_cone(const Row& row, const Vector3& impulse) {
   const Real pressed = row.normal.dot(impulse);
   if (!(pressed > 0)) return Vector3::Zero();
-  Vector3 rubbed = impulse - pressed * row.normal;
-  const Real size = rubbed.norm(), most = row.contact->friction * pressed;
-  if (size > most) rubbed *= most / size;
-  return pressed * row.normal + rubbed;
+  const Vector3 rubbed = impulse - pressed * row.normal;
+  return pressed * row.normal + no_longer_than(row.contact->friction * pressed, rubbed);
 }
 
 // What it should have been given.

@@ -4,11 +4,6 @@
 
 namespace penalty {
 
-inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s],
-inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
-/// Between bodies that can move, against whatever presses them together, nothing gathers speed faster than this [m/s²].
-inline constexpr Real recovery_acceleration = 100;
-
 /// What an impulse on the point gives to whoever drives the particles of it that are held [J].
 Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles);
 

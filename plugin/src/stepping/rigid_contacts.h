@@ -1,5 +1,7 @@
 // Contacts between rigid bodies, which the soft ones press on each other.
 #pragma once
+#include <array>
+
 #include "penalty/stepping/island.h"
 
 namespace penalty {
@@ -7,7 +9,8 @@ namespace penalty {
 /// Sequential impulses on the velocities of a substep, summed and clipped contact by contact: E. Catto, Iterative Dynamics
 /// with Temporal Coherence (2005). Of the gap g and the relative normal speed u each asks u >= -g/h while the gap is open,
 /// u >= 0 when it is closed; depth comes back as in ParticleContacts. Both bodies take the impulse at the same point, so both
-/// momenta are kept. Friction is clipped to Coulomb's cone.
+/// momenta are kept. Friction is clipped to Coulomb's cone, and moments against rolling and spinning to their shares of the
+/// force along the normal.
 class RigidContacts {
  public:
   explicit RigidContacts(Island& island);
@@ -41,17 +44,22 @@ class RigidContacts {
     bool is_impact = false;
     Real impulse = 0;
     Vector3 friction_impulse = Vector3::Zero();
+    Real lever = 0;                    // of turning, so that its speeds compare [m]
+    Vector3 moment = Vector3::Zero();  // against it [N m s]
   };
 
   static Vector3 relative_velocity(const Row& row) {
     return row.a->velocity_at(row.arm_a) - row.b->velocity_at(row.arm_b);
   }
-  void push(const Row& row, const Vector3& impulse);
+  static Vector3 relative_turning(const Row& row) { return row.a->angular_velocity - row.b->angular_velocity; }
+  void push(const Row& row, const Vector3& impulse, const Vector3& moment = Vector3::Zero());
+  Real rub(const RigidContact& contact, Row& row);
+  Real brake_turning(const RigidContact& contact, Row& row);
 
   Island& island_;
   Real acceleration_ = 0;  // largest of a body [m/s²]
   std::vector<Row> rows_;
-  std::vector<Vector3> start_;  // forces before the step
+  std::vector<std::array<Vector3, 2>> start_;  // forces and moments before the step
   Real outside_work_ = 0;
 };
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "particle_contacts.h"
+#include "contact_rules.h"
 
 namespace penalty {
 namespace {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "contact_rules.h"
 #include "surface_contacts.h"
 
 namespace penalty {
@@ -14,8 +15,7 @@ constexpr Real least_mobility = 1e-6;  // that is left without turning, relative
 using Vector2 = Eigen::Vector2<Real>;
 
 Vector2 in_cone(const TouchingPair& pair, const Vector2& rubbed) {
-  const Real size = rubbed.norm(), most = pair.friction * pair.given;
-  return size > most ? Vector2(rubbed * (most / size)) : rubbed;
+  return no_longer_than(pair.friction * pair.given, rubbed);
 }
 
 void forget(TouchingPair& pair) {

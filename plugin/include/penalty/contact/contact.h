@@ -107,10 +107,14 @@ struct RigidContact {
   int a = -1, b = -1;                                              // indices into the rigid bodies of the island
   Vector3 anchor_a = Vector3::Zero(), anchor_b = Vector3::Zero();  // in their frames [m]
   Vector3 normal = Vector3::UnitY();                               // from b to a, in the frame of b
-  Real friction = 0;                                               // Coulomb coefficient
-  Real restitution = 0;                                            // of speeds of approach; see Impact for soft bodies
+  Real radius = 0;       // of a ball about the point of a, which then is its surface, whatever the ball turns [m]
+  Real friction = 0;     // Coulomb coefficient
+  Real restitution = 0;  // of speeds of approach; see Impact for soft bodies
+  Real rolling = 0, spinning = 0;  // moments against turning across the normal and about it, by the force along it [m]
 
-  Vector3 force = Vector3::Zero();  // on a, of the last substep, be it of the last step [N]: where the next starts from
+  // On a, of the last substep, be it of the last step: where the next starts from.
+  Vector3 force = Vector3::Zero();   // [N]
+  Vector3 moment = Vector3::Zero();  // against rolling and spinning [N m]
 };
 
 }  // namespace penalty

@@ -66,14 +66,7 @@ struct RigidBody {
     const Vector3 moment = arm.cross(given);
     const auto [dv, dw] = response(given, moment);
     const Real work = given.dot(velocity + dv / 2) + moment.dot(angular_velocity + dw / 2);
-    if (articulation) {
-      push_links(given, moment);
-    } else {
-      velocity += dv;
-      angular_velocity += dw;
-    }
-    impulse += given;
-    angular_impulse += moment;
+    give(given, moment);
     return work;
   }
 
