@@ -185,6 +185,44 @@ TEST(Joint, AHeavyWeightHangsOnALightChain) {
   for (std::size_t k = 0; k < 20; ++k) EXPECT_LT(s.gap(k), 1e-4) << k;
 }
 
+// However many there are.
+TEST(Joint, AThousandKilogramsHangOnThirtyLinksOfOne) {
+  JointedIsland s;
+  const int links = 30;
+  for (int k = 0; k < links; ++k)
+    s.island.rigid_bodies.push_back(falling_ball(k + 1 < links ? 1 : 1000, {0.1 * (k + 1), 0, 0}));
+  for (int k = 0; k < links; ++k) s.add_ball(k, k - 1, {0.1 * k + 0.05, 0, 0});
+  const Real start = s.energy();
+  Real gap = 0, lowest = 0;
+  for (int k = 0; k < 120; ++k) {
+    s.step();
+    for (std::size_t joint = 0; joint < links; ++joint) gap = std::max(gap, s.gap(joint));
+    lowest = std::min(lowest, s[links - 1].position.y());
+  }
+  EXPECT_LT(gap, 1e-4);
+  EXPECT_LT(lowest, -2.9) << "it swings down";
+  EXPECT_LT(s.energy(), start + 1);
+}
+
+TEST(Joint, ARingOfFortyLinksInAnyOrderHangsTogether) {
+  JointedIsland s;
+  const int links = 40;
+  const auto angle = [](Real k) { return 2 * std::numbers::pi * k / links; };
+  for (int k = 0; k < links; ++k)
+    s.island.rigid_bodies.push_back(falling_ball(1, {std::cos(angle(k)), std::sin(angle(k)), 0}));
+  for (int n = 0; n < links; ++n) {
+    const int k = (7 * n) % links, next = (k + 1) % links;  // far from each other in the island
+    s.add_ball(k, next, {std::cos(angle(k + 0.5)), std::sin(angle(k + 0.5)), 0});
+  }
+  s.add_ball(3, -1, s[3].position);
+  Real gap = 0;
+  for (int k = 0; k < 120; ++k) {
+    s.step();
+    for (std::size_t joint = 0; joint <= links; ++joint) gap = std::max(gap, s.gap(joint));
+  }
+  EXPECT_LT(gap, 1e-4);
+}
+
 TEST(Joint, AMotorTurnsAWheelAsItsTorqueSaysUntilItHasItsSpeed) {
   const Real torque = 0.5, speed = 8, mass = 2, radius = 0.3, inertia = 0.4 * mass * radius * radius;
   JointedIsland s;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <utility>
 
 #include "contact_rules.h"
@@ -10,13 +10,15 @@
 namespace penalty {
 namespace {
 
-constexpr int most_joints_at_once = 24;   // in a matrix
+constexpr Real most_work = 1e6, usual_rows = 6;  // multiplications that a matrix is worth; of a joint
+constexpr Real least_pivot = 1e-10;              // share of the mobility
 constexpr Real row_compliance = 1e-9;     // of two-sided rows, relative to the mobility: there may be more than needed
 constexpr Real held_share = 1e-7;         // share of the mobility below which the two-sided rows hold a limited one
 constexpr Real largest_turn = 0.02;       // in a substep [rad]
 constexpr int fewest_joint_substeps = 8;  // with joints
 constexpr int most_joint_substeps = 200;  // because of them
-constexpr Real broken_share = 1 - 1e-9;   // share of the strength
+constexpr Real nothing_known = std::numeric_limits<Real>::infinity();
+constexpr Real broken_share = 1 - 1e-9;  // share of the strength
 
 // Radius about which the mass of a body lies, so that its turning can be told in m/s.
 Real radius_of(const RigidBody& body) {
@@ -32,6 +34,7 @@ Joints::Joints(Island& island) : island_(island) {
     start_.push_back(joint.forces);
     start_rows_.push_back(joint.num_rows);
   }
+  left_.resize(island.joints.size());
   make_blocks();
 }
 
@@ -45,35 +48,58 @@ int Joints::least_substeps(const Island& island, Real duration) {
   return static_cast<int>(std::clamp<Real>(wanted, fewest_joint_substeps, most_joint_substeps));
 }
 
-// Joints that share a body that moves, or are joined by others, are in one block.
+// Joints that share a body that moves, or are joined by others, are in one block: from one end of it to the other.
 void Joints::make_blocks() {
-  std::vector<int> first(island_.rigid_bodies.size());
-  std::iota(first.begin(), first.end(), 0);
-  const auto first_of = [&first](int body) {
-    while (first[body] != body) body = first[body] = first[first[body]];
-    return body;
+  const std::size_t count = island_.joints.size();
+  places_.resize(count);
+  std::vector<std::vector<int>> joints_of(island_.rigid_bodies.size());
+  const auto for_each_moving_body = [this](int joint, const auto& call) {
+    for (const int body : {island_.joints[joint].a, island_.joints[joint].b})
+      if (body >= 0 && island_.rigid_bodies[body].is_dynamic()) call(body);
   };
-  const auto moving = [this](int body) { return body >= 0 && island_.rigid_bodies[body].is_dynamic(); };
-  for (const Joint& joint : island_.joints)
-    if (moving(joint.a) && moving(joint.b)) first[first_of(joint.a)] = first_of(joint.b);
-  std::vector<int> size(first.size(), 0), known(first.size(), -1);
-  const auto group_of = [&](const Joint& joint) {
-    return moving(joint.a) ? first_of(joint.a) : moving(joint.b) ? first_of(joint.b) : -1;
+  for (std::size_t k = 0; k < count; ++k)
+    for_each_moving_body(static_cast<int>(k), [&](int body) { joints_of[body].push_back(static_cast<int>(k)); });
+  std::vector<int> seen_in(count, -1);  // which search
+  int searches = 0;
+  const auto breadth_first = [&](int start) {
+    std::vector<int> found{start};
+    seen_in[start] = searches;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      for_each_moving_body(found[i], [&](int body) {
+        for (const int other : joints_of[body])
+          if (std::exchange(seen_in[other], searches) != searches) found.push_back(other);
+      });
+    ++searches;
+    return found;
   };
-  for (const Joint& joint : island_.joints)
-    if (const int group = group_of(joint); group >= 0) ++size[group];
-  for (std::size_t k = 0; k < island_.joints.size(); ++k) {
-    const int group = group_of(island_.joints[k]);
-    block_of_.push_back(-1);
-    if (group < 0) continue;
-    int& block = known[group];
-    if (block < 0 || size[group] > most_joints_at_once) {
-      block = static_cast<int>(blocks_.size());
-      blocks_.emplace_back();
+  for (std::size_t k = 0; k < count; ++k) {
+    bool moves = false;
+    for_each_moving_body(static_cast<int>(k), [&](int) { moves = true; });
+    if (!moves || places_[k].block >= 0) continue;
+    std::vector<int> order = breadth_first(breadth_first(static_cast<int>(k)).back());
+    std::reverse(order.begin(), order.end());
+    for (std::size_t i = 0; i < order.size(); ++i)
+      places_[order[i]].place = places_[order[i]].first = static_cast<int>(i);
+    Real work = 0;
+    for (const int joint : order) {
+      Place& place = places_[joint];
+      for_each_moving_body(joint, [&](int body) {
+        for (const int other : joints_of[body]) place.first = std::min(place.first, places_[other].place);
+      });
+      const Real width = usual_rows * (place.place - place.first + 1);
+      work += usual_rows * width * width;
     }
-    block_of_.back() = block;
-    blocks_[block].joints.push_back(static_cast<int>(k));
+    const int size = static_cast<int>(order.size());
+    if (work <= most_work)
+      add_block(order, size);
+    else
+      for (const int joint : order) add_block({joint}, size);
   }
+}
+
+void Joints::add_block(const std::vector<int>& joints, int connected) {
+  for (const int joint : joints) places_[joint].block = static_cast<int>(blocks_.size());
+  blocks_.emplace_back(Block{.joints = connected});
 }
 
 void Joints::begin_attempt() {
@@ -82,6 +108,7 @@ void Joints::begin_attempt() {
     Joint& joint = island_.joints[k];
     joint.forces = start_[k];
     joint.num_rows = start_rows_[k];
+    left_[k].fill(nothing_known);
     joint.asks = joint.is_broken = false;
     joint.given.fill(0);
     for (Vector3* sum : {&joint.impulse_a, &joint.moment_a, &joint.impulse_b, &joint.moment_b}) sum->setZero();
@@ -102,7 +129,7 @@ void Joints::begin(Real h, Real since, bool drifts) {
     Real bend = 0;
     for (; end < asked_.size() && asked_[end].joint == asked_[k].joint; ++end)
       bend = std::max(bend, bend_of(asked_[end]));
-    for (; k < end; ++k) add_row(asked_[k], drifts, h * bend);
+    for (; k < end; ++k) add_row(asked_[k], h, drifts, h * bend);
   }
   for (Block& block : blocks_) factor(block);
   start(since);
@@ -121,6 +148,7 @@ void Joints::start(Real since) {
       const Real known = is_same ? since * joint.forces[rows_[row].number] : 0;
       push(rows_[row], std::clamp(known, rows_[row].least, rows_[row].most));
     }
+    if (!is_same) left_[k].fill(nothing_known);
     joint.num_rows = count;
     joint.asks = joint.asks || count > 0;
   }
@@ -135,10 +163,27 @@ Real Joints::bend_of(const JointRow& asked) const {
   return bend;
 }
 
-// `bends`: the speed that turns give back in a drift.
-void Joints::add_row(const JointRow& asked, bool drifts, Real bends) {
+// Errors that no turn of the bodies made may be large: they come back slowly, in many joints the more so, as their bodies
+// gather the speeds of all. What the last turn made goes in one drift; a chain that was taken over torn apart would feed its
+// turning with what is left of that. `bends`: the speed that turns give back in a drift. A stop that is still open lets its
+// way be gone, however long that is.
+void Joints::limit_recovery(Row& row, Real h, bool drifts, Real bends) {
+  Real& left = left_[row.joint][row.number];  // after the last drift [m]
+  const Real asked = row.recovery, slowest = recovery_speed / blocks_[places_[row.joint].block].joints / row.lever;
+  const Real fastest = drifts ? slowest + bends / row.lever : 0;
+  if (!row.is_two_sided() || !drifts) {
+    if (row.least < 0) row.recovery = std::max(row.recovery, -fastest);
+    if (row.most > 0) row.recovery = std::min(row.recovery, fastest);
+    return;
+  }
+  const Real made = std::isfinite(left) ? std::clamp(asked - left / h, -bends / row.lever, bends / row.lever) : 0;
+  row.recovery = std::clamp(asked - made, -slowest, slowest) + made;
+  left = h * (asked - row.recovery);
+}
+
+void Joints::add_row(const JointRow& asked, Real h, bool drifts, Real bends) {
   const Joint& joint = island_.joints[asked.joint];
-  const int block = block_of_[asked.joint];
+  const int block = places_[asked.joint].block;
   if (joint.is_broken || block < 0) return;
   Row row;
   static_cast<JointRow&>(row) = asked;
@@ -163,11 +208,7 @@ void Joints::add_row(const JointRow& asked, bool drifts, Real bends) {
   meet_body(joint.b, row.linear_b, row.angular_b, row.b, row.velocity_b, row.turn_b);
   if (!(row.mobility > 0)) return;
   if (row.linear_a.isZero(0) && row.linear_b.isZero(0)) row.lever = smallest;
-  // Errors that no turn of the bodies made may be large: they come back slowly. A stop that is still open lets its way be
-  // gone, however long that is.
-  const Real fastest = drifts ? (recovery_speed + bends) / row.lever : 0;
-  if (row.least < 0) row.recovery = std::max(row.recovery, -fastest);
-  if (row.most > 0) row.recovery = std::min(row.recovery, fastest);
+  limit_recovery(row, h, drifts, bends);
   if (joint.strength < JointRow::unlimited) {
     const Real given = joint.given[row.number];
     row.least = std::clamp(row.least, -joint.strength - given, joint.strength - given);
@@ -206,20 +247,29 @@ void Joints::push(Row& row, Real impulse) {
 }
 
 void Joints::factor(Block& block) {
-  const auto size = static_cast<Eigen::Index>(block.two_sided.size());
+  std::vector<std::size_t>& rows = block.two_sided;
+  const auto place_of = [this](std::size_t row) -> const Place& { return places_[rows_[row].joint]; };
+  std::sort(rows.begin(), rows.end(), [&](std::size_t k, std::size_t l) {
+    return std::pair(place_of(k).place, k) < std::pair(place_of(l).place, l);
+  });
   block.answers.clear();
-  if (size > 0) {
-    block.matrix.resize(size, size);
-    block.asked.resize(size);
-    block.impulses.resize(size);
-    for (Eigen::Index i = 0; i < size; ++i) {
-      const Row& row = rows_[block.two_sided[i]];
-      for (Eigen::Index j = 0; j < i; ++j)
-        block.matrix(i, j) = block.matrix(j, i) = coupling(row, rows_[block.two_sided[j]]);
-      block.matrix(i, i) = (1 + row_compliance) * row.mobility + row.softness;
-    }
-    block.factors.compute(block.matrix);
+  block.matrix.clear();
+  block.asked.resize(static_cast<Eigen::Index>(rows.size()));
+  block.impulses.resize(block.asked.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = rows_[rows[i]];
+    const auto first =
+        static_cast<std::size_t>(std::lower_bound(rows.begin(), rows.end(), place_of(rows[i]).first,
+                                                  [&](std::size_t k, int place) { return place_of(k).place < place; }) -
+                                 rows.begin());
+    block.matrix.add_row(static_cast<Eigen::Index>(first));
+    const auto at = [&](std::size_t j) -> Real& {
+      return block.matrix.at(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    };
+    for (std::size_t j = first; j < i; ++j) at(j) = coupling(row, rows_[rows[j]]);
+    at(i) = (1 + row_compliance) * row.mobility + row.softness;
   }
+  block.matrix.factor(least_pivot);
 }
 
 // What the two-sided rows give when this one gives a unit impulse.
@@ -229,7 +279,8 @@ void Joints::answer(Block& block, Row& row) {
   if (block.two_sided.empty()) return;
   for (std::size_t i = 0; i < block.two_sided.size(); ++i)
     block.asked[static_cast<Eigen::Index>(i)] = -coupling(rows_[block.two_sided[i]], row);
-  block.impulses = block.factors.solve(block.asked);
+  block.impulses = block.asked;
+  block.matrix.solve(block.impulses);
   row.free_mobility -= block.asked.dot(block.impulses);
   block.answers.insert(block.answers.end(), block.impulses.begin(), block.impulses.end());
   if (!(row.free_mobility > held_share * row.mobility)) row.free_mobility = 0;
@@ -254,7 +305,8 @@ Real Joints::meet(Block& block) {
     largest = std::max(largest, std::abs(asked) * row.lever);
     block.asked[static_cast<Eigen::Index>(i)] = asked;
   }
-  block.impulses = block.factors.solve(block.asked);
+  block.impulses = block.asked;
+  block.matrix.solve(block.impulses);
   for (std::size_t i = 0; i < block.two_sided.size(); ++i)
     push(rows_[block.two_sided[i]], block.impulses[static_cast<Eigen::Index>(i)]);
   return largest;

@@ -1,8 +1,7 @@
 // Joints between rigid bodies, in the sweeps of a substep.
 #pragma once
-#include <Eigen/Cholesky>
-
 #include "penalty/stepping/island.h"
+#include "skyline_matrix.h"
 
 namespace penalty {
 
@@ -12,8 +11,9 @@ namespace penalty {
 ///     (J W Jᵀ + softness) impulses = wanted + recovery - J v
 ///
 /// Rows with limits (stops, motors) are swept over one by one, their impulses summed and clipped, each together with what
-/// the two-sided ones must answer: a motor turns a wheel that stays on its axle. Joints of more bodies than a matrix is
-/// worth are met one by one. Both bodies take the impulse on the same line, so both momenta are kept. The work of motors,
+/// the two-sided ones must answer: a motor turns a wheel that stays on its axle. The matrix is a narrow band where joints
+/// stand in the order of E. Cuthill and J. McKee, Reducing the Bandwidth of Sparse Symmetric Matrices (1969), reversed; nets
+/// in which it is too wide to be worth it are met joint by joint. Both bodies take the impulse on the same line, so both momenta are kept. The work of motors,
 /// of springs, of bodies that move and take no impulse, and of taking errors back is work from outside.
 class Joints {
  public:
@@ -51,18 +51,19 @@ class Joints {
     Real impulse = 0;
     std::size_t answer = 0;  // of the two-sided rows, where it begins
   };
-  struct Block {  // of joints that are met together
-    std::vector<int> joints;
+  struct Block {                                            // of joints that are met together
+    int joints = 1;                                         // that hang together, these and others
     std::vector<std::size_t> two_sided = {}, limited = {};  // rows
-    Eigen::MatrixXd matrix = {};
+    SkylineMatrix matrix = {};
     Eigen::VectorXd asked = {}, impulses = {};
     std::vector<Real> answers = {};
-    Eigen::LDLT<Eigen::MatrixXd> factors = {};
   };
 
   void make_blocks();
+  void add_block(const std::vector<int>& joints, int connected);
   void start(Real since);
-  void add_row(const JointRow& asked, bool drifts, Real bends);
+  void add_row(const JointRow& asked, Real h, bool drifts, Real bends);
+  void limit_recovery(Row& row, Real h, bool drifts, Real bends);
   Real bend_of(const JointRow& asked) const;
   void factor(Block& block);
   void answer(Block& block, Row& row);
@@ -76,9 +77,14 @@ class Joints {
   std::vector<JointRow> asked_;
   std::vector<Row> rows_;
   std::vector<Block> blocks_;
-  std::vector<int> block_of_;  // by joint
+  struct Place {
+    int block = -1;            // none where nothing moves
+    int place = 0, first = 0;  // in its order, and the first that shares a body with it
+  };
+  std::vector<Place> places_;  // by joint
   std::vector<std::array<Real, Joint::most_rows>> start_;
   std::vector<int> start_rows_;
+  std::vector<std::array<Real, Joint::most_rows>> left_;  // errors that are not yet taken back; infinity: not known
   Real outside_work_ = 0;
 };
 
