@@ -25,8 +25,8 @@ Real applied_impulse(const Joint& joint) { return joint.num_rows > 0 ? joint.giv
 }  // namespace
 
 void RigidJoints::take_from(btDiscreteDynamicsWorld& world) {
-  if (world_ == &world) return;
   world_ = &world;
+  world.removeAction(this);  // which a new world at an old address has not
   world.addAction(this);
 }
 
