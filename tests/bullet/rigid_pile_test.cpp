@@ -37,9 +37,15 @@ class RigidPile : public WorldTest {
     return depth;
   }
 
+  static btVector3 offset_of(const btRigidBody& box, const btRigidBody& other) {
+    return box.getWorldTransform().getOrigin() - other.getWorldTransform().getOrigin();
+  }
+
   // Four seconds; after three nothing lies deep, everything is level, and no step of all gains much.
   void expect_to_stand(const btSoftBody& body, const std::vector<btRigidBody*>& boxes, const Vector3& lowest_half) {
     Real energy = sim.totals().energy;
+    std::vector<btVector3> offsets;
+    for (std::size_t k = 1; k < boxes.size(); ++k) offsets.push_back(offset_of(*boxes[k], *boxes[k - 1]));
     for (int k = 0; k < 240; ++k) {
       sim.step(frame);
       const Real now = sim.totals().energy;
@@ -54,8 +60,7 @@ class RigidPile : public WorldTest {
       EXPECT_LT(Real(box->getAngularVelocity().length()), 0.3);
     }
     for (std::size_t k = 1; k < boxes.size(); ++k) {
-      const btVector3 offset =
-          boxes[k]->getWorldTransform().getOrigin() - boxes[k - 1]->getWorldTransform().getOrigin();
+      const btVector3 offset = offset_of(*boxes[k], *boxes[k - 1]) - offsets[k - 1];
       EXPECT_LT(std::hypot(Real(offset.x()), Real(offset.z())), 0.03) << "slid off";
     }
     EXPECT_GT(lowest(body), 0.019);
@@ -89,6 +94,15 @@ TEST_P(RigidPile, TwoTimesTenKilogramsOnATorusOfOne) {
   const btSoftBody& body = add_torus();
   btRigidBody& lower = sim.add_box({1.2, 0.15, 1.2}, 10, {0, 0.8, 0});
   expect_to_stand(body, {&lower, &sim.add_box({0.6, 0.15, 0.6}, 10, {0, 1.12, 0})}, {1.2, 0.15, 1.2});
+}
+
+// Smaller than the torus, and beside its axis.
+TEST_P(RigidPile, ATowerThatStandsAsideOnATorusStaysThere) {
+  const btSoftBody& body = add_torus();
+  const Vector3 half(0.6, 0.15, 0.6);
+  btRigidBody& lower = sim.add_box(half, 10, {0.05, 0.8, 0});
+  expect_to_stand(body, {&lower, &sim.add_box({0.3, 0.15, 0.3}, 10, {0.1, 1.105, 0})}, half);
+  EXPECT_NEAR(Real(lower.getWorldTransform().getOrigin().x()), 0.05, 0.08);
 }
 
 TEST_P(RigidPile, FiveBoxesOnATorus) {
