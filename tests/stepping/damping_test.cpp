@@ -1,8 +1,7 @@
 // Kelvin-Voigt damping in the step: a mode of frequency w decays at beta w²/2, whatever the mesh and the substeps.
 #include <Eigen/Eigenvalues>
-#include <numbers>
 
-#include "stepping/surface_bodies.h"
+#include "stepping/islands.h"
 
 namespace penalty::testing {
 namespace {
@@ -114,89 +113,6 @@ TEST(Damping, OfElementsMayBeSetLater) {
   const Real before = bar.energy();
   for (int step = 0; step < 60; ++step) advance(bar, 1.0 / 60);
   EXPECT_LT(bar.energy(), 0.5 * before);
-}
-
-// The largest speed of a particle over a step, from positions: what is seen to move.
-Real largest_motion(SurfaceBodies& bodies, int count) {
-  std::vector<PackedVectors> before;
-  before.reserve(count);
-  for (int k = 0; k < count; ++k) before.push_back(bodies[k].particles().positions);
-  bodies.step();
-  Real largest = 0;
-  for (int k = 0; k < count; ++k)
-    largest = std::max(largest, (bodies[k].particles().positions - before[k]).colwise().norm().maxCoeff() * 60);
-  return largest;
-}
-
-Real largest_speed(SurfaceBodies& bodies, int count) {
-  Real largest = 0;
-  for (int k = 0; k < count; ++k)
-    largest = std::max(largest, bodies[k].particles().velocities.colwise().norm().maxCoeff());
-  return largest;
-}
-
-// Stands on a floor of friction, under gravity of the earth.
-SurfaceBodies standing(Real size, Real damping_time) {
-  SurfaceBodies bodies;
-  bodies.margin = 0.01 * size;
-  bodies.friction = 0.6;
-  bodies.gravity = {0, -9.81, 0};
-  bodies.floors = {0};
-  bodies.damping_time = damping_time;
-  return bodies;
-}
-
-TEST(Settling, OfATowerThatSwaysTakesThreeSeconds) {
-  for (const Real size : {0.01, 1.0, 100.0}) {
-    SCOPED_TRACE("size " + std::to_string(size));
-    const Real slowness = std::sqrt(size);  // of what gravity makes of it
-    SurfaceBodies bodies = standing(size, 0.02 * slowness);
-    const Real mass = 300 * size * size * size;
-    const TetMesh mesh = make_box({size, 3 * size, size}, {3, 9, 3});
-    Body& tower = bodies.add(mesh, 0.5 * 9.81 * size * mass, mass, {.shift = {0, 0.005 * size, 0}});
-    for (int i = 0; i < tower.particles().size(); ++i)
-      tower.set_velocity(i, {slowness * mesh.vertices(1, i) / (3 * size), 0, 0});
-    const int steps = static_cast<int>(180 * std::max<Real>(slowness, 1));
-    bodies.step(1.0 / 60, steps);
-    EXPECT_LT(largest_motion(bodies, 1), 0.005 * slowness);
-    bodies.step(1.0 / 60, steps);
-    EXPECT_LT(largest_motion(bodies, 1), 0.001 * slowness);
-    EXPECT_LT(largest_speed(bodies, 1), 0.001 * slowness);
-  }
-}
-
-TEST(Settling, OfThreeBoxesOnEachOtherTakesThreeSeconds) {
-  SurfaceBodies bodies = standing(1, 0.02);
-  for (int k = 0; k < 3; ++k) bodies.add(make_box({1, 1, 1}, {3, 3, 3}), 100, 10, {.shift = {0, 0.02 + 1.03 * k, 0}});
-  bodies.step(1.0 / 60, 180);
-  EXPECT_LT(largest_motion(bodies, 3), 0.005);
-  bodies.step(1.0 / 60, 180);
-  EXPECT_LT(largest_motion(bodies, 3), 0.001);
-  EXPECT_LT(largest_speed(bodies, 3), 0.001);
-}
-
-TEST(Settling, LetsACubeBounceToAThirdOfItsFall) {
-  SurfaceBodies bodies = standing(1, 0.005);
-  Body& cube = bodies.add(make_box({1, 1, 1}, {4, 4, 4}), 1000, 10, {.shift = {0, 0.505, 0}});
-  Real highest = 0;
-  for (int k = 0; k < 60; ++k) {
-    bodies.step();
-    if (k > 30) highest = std::max(highest, cube.particles().positions.row(1).minCoeff() - bodies.margin / 2);
-  }
-  EXPECT_GT(highest, 0.5 / 3);
-  EXPECT_LT(highest, 0.5);
-}
-
-TEST(Settling, LeavesWhatSlidesAlone) {
-  // Down a slope of 3 degrees without friction, in its frame.
-  SurfaceBodies bodies = standing(1, 0.02);
-  bodies.friction = 0;
-  const Real slope = 3 * std::numbers::pi / 180;
-  bodies.gravity = 9.81 * Vector3(std::sin(slope), -std::cos(slope), 0);
-  Body& cube = bodies.add(make_box({1, 1, 1}, {3, 3, 3}), 100, 10, {.shift = {0, 0.005, 0}});
-  bodies.step(1.0 / 60, 120);
-  const Vector3 mean = cube.particles().velocities.rowwise().mean().head<3>();
-  EXPECT_NEAR(mean.x(), 2 * bodies.gravity.x(), 1e-9);
 }
 
 }  // namespace

@@ -12,6 +12,11 @@ Body& SurfaceBodies::add(const TetMesh& mesh, Real stiffness, Real mass, const S
              boundary_faces(mesh.tetrahedra), mass, start, false);
 }
 
+Body& SurfaceBodies::add(const TetMesh& mesh, const Material& material, Real mass, const Start& start) {
+  return add(make_elastic_field(mesh.vertices, mesh.tetrahedra, material), mesh.vertices,
+             boundary_faces(mesh.tetrahedra), mass, start, false);
+}
+
 Body& SurfaceBodies::add_cloth(const TriangleSurface& sheet, Real stiffness, Real bending, Real mass,
                                const Start& start) {
   PotentialField field(sheet.vertices);

@@ -26,6 +26,7 @@ class SurfaceBodies {
 
   /// A body of tetrahedra with equal masses.
   Body& add(const TetMesh& mesh, Real stiffness, Real mass, const Start& start = {});
+  Body& add(const TetMesh& mesh, const Material& material, Real mass, const Start& start = {});
   /// A cloth of springs and hinges, which touches itself.
   Body& add_cloth(const TriangleSurface& sheet, Real stiffness, Real bending, Real mass, const Start& start = {});
 

@@ -23,6 +23,19 @@ void book_depth(const Island& island, int body, Real depth) {
   report.contact_depth = std::max(report.contact_depth, depth);
 }
 
+void add_records(const Island& island, std::vector<ContactRecord>& records) {
+  for (const Contact& contact : island.contacts) {
+    if (contact.given.is_none()) continue;
+    const ContactPlace place = place_of(contact, island);
+    ContactRecord& record = records.emplace_back(record_of(contact.given));
+    record.body = contact.a.body;
+    record.other_body = contact.b.body;
+    record.other_rigid = contact.b.rigid;
+    record.point = place.at;
+    record.gap = place.gap;
+  }
+}
+
 }  // namespace
 
 void report_particle_contacts(Island& island) {
@@ -33,14 +46,13 @@ void report_particle_contacts(Island& island) {
       ++island.bodies[body]->report.num_contacts;
       book_depth(island, body, -place.gap);
     }
-    if (contact.given.is_none()) continue;
-    ContactRecord& record = island.records.emplace_back(record_of(contact.given));
-    record.body = contact.a.body;
-    record.other_body = contact.b.body;
-    record.other_rigid = contact.b.rigid;
-    record.point = place.at;
-    record.gap = place.gap;
   }
+}
+
+void find_records(Island& island, const SurfaceContacts& surfaces) {
+  island.records.clear();
+  add_records(island, island.records);
+  surfaces.add_records(island.records);
 }
 
 // Closest points are those of the last sweeps, which were where the step ends.
@@ -53,7 +65,11 @@ void SurfaceContacts::report() {
   }
   for (const SurfaceContact& contact : island_.surfaces) report_enclosed(contact);
   merge_records();
-  for (const TouchingRecord& record : scratch_.records) report(record);
+}
+
+void SurfaceContacts::add_records(std::vector<ContactRecord>& records) const {
+  if (is_empty()) return;
+  for (const TouchingRecord& touching : scratch_.records) records.push_back(record_of(touching));
 }
 
 // Also of what no pair holds: points that are not led out, be it that the particles hold the body that they are of.
@@ -82,7 +98,7 @@ void SurfaceContacts::merge_records() {
   if (!records.empty()) records.resize(last + 1);
 }
 
-void SurfaceContacts::report(const TouchingRecord& touching) {
+ContactRecord SurfaceContacts::record_of(const TouchingRecord& touching) const {
   const TouchingFeatures& features = touching.features;
   const SurfaceContact& contact = island_.surfaces[features.contact];
   const SurfacePair& pair = *contact.pair;
@@ -96,7 +112,7 @@ void SurfaceContacts::report(const TouchingRecord& touching) {
     (k < size_of_first ? at_first : at_second) +=
         std::abs(closest.weights[k]) * (k < size_of_first ? one : two).position(q.points[k]);
 
-  ContactRecord record = record_of(touching.given);
+  ContactRecord record = penalty::record_of(touching.given);
   const int of_first = q.from_b ? contact.body_b : contact.body_a;
   record.body = of_first >= 0 ? of_first : contact.body_a;
   record.other_body = q.from_b ? contact.body_a : contact.body_b;
@@ -109,7 +125,7 @@ void SurfaceContacts::report(const TouchingRecord& touching) {
   record.point = contact.rigid < 0 ? Vector3((at_first + at_second) / 2) : one.is_rigid() ? at_second : at_first;
   const bool is_inside = features.is_enclosed && closest.difference.dot(touching.given.pressed) < 0;
   record.gap = (is_inside ? -distance : distance) - touching.thickness;
-  island_.records.push_back(record);
+  return record;
 }
 
 TouchingFeatures SurfaceContacts::features_of(const SurfaceContact& contact, const FeaturePair& q,

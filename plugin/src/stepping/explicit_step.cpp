@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "anchors.h"
 #include "coupling.h"
@@ -11,6 +12,7 @@
 #include "particle_contacts.h"
 #include "restitution.h"
 #include "rigid_contacts.h"
+#include "settling.h"
 #include "stepped_body.h"
 #include "surface_contacts.h"
 
@@ -67,6 +69,7 @@ class SubCycle {
         !rigid_contacts_.is_empty() || !joints_.is_empty() || !anchors_.is_empty() || particle_contacts_.are_coupled();
     has_contacts_ = are_coupled_ || !particle_contacts_.is_empty() || !surfaces.is_empty();
     for (const SteppedBody* body : island_.bodies) {
+      settles_ = settles_ || (has_contacts_ && body->options.settling_speed > 0 && !body->gravity.isZero(0));
       damps_ = damps_ || damps(*body);
       evolves_ = evolves_ || body->field->evolves();
       for (int i = 0; i < body->particles.size(); ++i)
@@ -79,47 +82,42 @@ class SubCycle {
     }
   }
 
-  /// Returns how many substeps it took: `substeps`, rounded up to whole blocks.
-  int run(int substeps) {
-    // Seen once in a half period and always at rest, a mode is not damped: the fewer substeps between, the fewer such.
-    const int most = std::clamp(substeps / 4, 1, most_blocks);
-    const int dampings = !damps_ ? 0 : has_contacts_ ? std::min(damped_blocks, substeps) : most;
-    int blocks = std::max(dampings, 1);
-    if (evolves_) blocks *= std::max(most / blocks, 1);
-    const int per_block = (substeps + blocks - 1) / blocks;
-    const Real h = duration_ / (blocks * per_block);
+  void run(int substeps) {
+    const Real h = duration_ / substeps;
     outside_work_ = since_contacts_ = 0;
     for_each_constraint([](auto& constraints) { constraints.begin_attempt(); });
     remaining_ = duration_;
     for (SteppedBody* body : island_.bodies) {
       body->step_flows = {};
-      body->is_pushed = false;
       body->report.damping_share = 1;
       body->damper.begin_step();
     }
-    island_.is_held_up = false;
-    for (int block = 0; block < blocks; ++block) {
-      Real kick_time = h / 2;
-      for (int k = 0; k < per_block; ++k) {
-        substep(kick_time, h);
-        kick_time = h;
-      }
+    // Seen once in a half period and always at rest, a mode is not damped: the fewer substeps between, the fewer such.
+    const int most = std::clamp(substeps / 4, 1, most_blocks),
+              dampings = has_contacts_ ? std::min(damped_blocks, substeps) : most;
+    const int flows = most, apart = std::max(substeps / 2, 1), settling_instant = moving_instant(apart);
+    int flowed = 0;  // substeps before the last flow
+    Real kick_time = h / 2;
+    for (int k = 1; k <= substeps; ++k) {
+      substep(kick_time, h);
+      kick_time = h;
+      const auto ends_one_of = [&](int parts) { return k * parts / substeps > (k - 1) * parts / substeps; };
+      const bool damps_now = damps_ && ends_one_of(dampings);
+      const bool settles_now = settles_ && (k == settling_instant || k == settling_instant + apart) && is_pressed();
+      const bool flows_now = evolves_ && ends_one_of(flows);
+      if (!damps_now && !settles_now && !flows_now && k < substeps) continue;
+      kick_time = h / 2;
       kick_others(h / 2);
       for (SteppedBody* body : island_.bodies) kick(*body, h / 2);
       // Of a velocity that contacts have not seen there is nothing to damp, and nothing is handed out.
       if (has_contacts_)
         solve_contacts(0, h, [&] { surfaces_.close(h, since_contacts_, [this, h] { return sweep(h); }); });
-      if (evolves_) evolve(duration_ / blocks);
-      const bool damps_now = dampings > 0 && (block + 1) % (blocks / dampings) == 0;
-      const bool settles_now = island_.is_held_up && block + 1 == blocks;
+      if (flows_now) evolve((k - std::exchange(flowed, k)) * h);
       if (damps_now) damp(duration_ / dampings);
-      if (settles_now)
-        for (SteppedBody* body : island_.bodies)
-          if (body->is_pushed) settle(*body, duration_);
-      if (has_contacts_ && (damps_now || settles_now))
+      const bool has_settled = settles_now && settle(duration_ / std::min(substeps, 2));
+      if (has_contacts_ && (damps_now || has_settled))
         solve_contacts(0, h, [&] { surfaces_.close_again(h, [this, h] { return sweep(h); }); });
     }
-    return blocks * per_block;
   }
 
   Real outside_work() const {
@@ -218,6 +216,22 @@ class SubCycle {
         evaluate_forces(*coupling, island_);
   }
 
+  // After this substep what lies is settled, in each step after another, as a mode may be at rest whenever it is damped.
+  int moving_instant(int substeps) const {
+    const Real turns = std::numbers::phi * island_.bodies.front()->num_steps;
+    return 1 + static_cast<int>((turns - std::floor(turns)) * substeps);
+  }
+
+  bool is_pressed() const {
+    return surfaces_.has_given() || std::any_of(island_.contacts.begin(), island_.contacts.end(),
+                                                [](const Contact& contact) { return !contact.given.is_none(); });
+  }
+
+  bool settle(Real duration) {
+    find_records(island_, surfaces_);
+    return penalty::settle(island_, duration);
+  }
+
   void damp(Real duration) {
     for (SteppedBody* body : island_.bodies) {
       if (!damps(*body)) continue;
@@ -260,7 +274,7 @@ class SubCycle {
   Real since_contacts_ = 0;  // time of the kicks since contacts were solved [s]
   Real first_change_ = 0;    // of a normal speed by the first sweep [m/s]
   int sweeps_ = 0;
-  bool has_contacts_ = false, are_coupled_ = false, damps_ = false, evolves_ = false;
+  bool has_contacts_ = false, are_coupled_ = false, damps_ = false, settles_ = false, evolves_ = false;
   bool has_driven_particles_ = false;
   Real outside_work_ = 0;
 };
@@ -348,13 +362,13 @@ void advance_explicitly(Island& island, Real duration) {
 
   SubCycle cycle(island, surfaces, duration);
   const auto attempt = [&](int substeps) {
-    const int taken = cycle.run(substeps);
+    cycle.run(substeps);
     const Real end_energy = energy(island);
     return Attempt{
-        .substeps = taken,
+        .substeps = substeps,
         .energy = end_energy,
         .allowed = start_energy + cycle.outside_work() + surfaces.outside_work() + constant_force_work(island),
-        .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / taken};
+        .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / substeps};
   };
   const GuardedStep step =
       guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
@@ -370,6 +384,7 @@ void advance_explicitly(Island& island, Real duration) {
   }
   report_particle_contacts(island);
   surfaces.report();
+  find_records(island, surfaces);
   if (!step.finite) {
     island.records.clear();
     name_bad_particles(island.bodies);

@@ -212,11 +212,6 @@ Real ParticleContacts::settle_held() {
 
 void ParticleContacts::end(Real since) {
   for (const Row& row : rows_) {
-    if (!row.impulse.isZero(0)) {
-      row.body->is_pushed = true;
-      if (row.other) row.other->is_pushed = true;
-      if (row.is_obstacle && row.rigid) island_.is_held_up = island_.is_held_up || row.rigid->is_at_rest();
-    }
     if (starts_warm_) row.contact->memory.keep(row.impulse, row.normal, since);
     if (row.impulse.isZero(0)) continue;
     const Real along = row.normal.dot(row.impulse);

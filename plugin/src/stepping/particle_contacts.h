@@ -14,8 +14,7 @@ struct ContactPlace {
 };
 ContactPlace place_of(const Contact& contact, const Island& island);
 
-/// Adds contacts of particles, as they are now, to the reports of the bodies, and what they gave to the records of the
-/// island.
+/// Adds contacts of particles, as they are now, to the reports of the bodies.
 void report_particle_contacts(Island& island);
 
 /// A contact in one drift.

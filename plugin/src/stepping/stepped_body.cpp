@@ -40,6 +40,7 @@ Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Re
 
 Real begin_step(SteppedBody& body, bool may_unfold) {
   body.report = {};
+  ++body.num_steps;
   body.report.unfolded =
       may_unfold && body.options.unfold &&
       unfold(body.particles.positions, body.field->rest_positions(), body.rest_span, body.particles.inverse_masses);
@@ -61,28 +62,6 @@ void undo_step(SteppedBody& body) {
   body.particles.velocities = body.start.velocities;
   body.field->set_state(body.start_state);
   evaluate_forces(body);
-}
-
-void settle(SteppedBody& body, Real duration) {
-  constexpr Real settling_rate = 6;  // in sqrt(g / size), of motion that is almost none
-  const Real gravity = body.gravity.norm();
-  const Real fastest = body.options.settling_speed * std::sqrt(gravity * body.size);
-  if (!(fastest > 0) || !(body.mass > 0)) return;
-  Particles& particles = body.particles;
-  const Vector3 mean = linear_momentum(particles) / body.mass;
-  Real within = 0;
-  for (int i = 0; i < particles.size(); ++i) {
-    if (particles.inverse_masses[i] == 0) return;  // held by that, it needs no settling
-    within += (particles.velocities.col(i).head<3>() - mean).squaredNorm() / particles.inverse_masses[i];
-  }
-  const Real rate = settling_rate * std::sqrt(gravity / body.size) * (1 - within / (body.mass * fastest * fastest));
-  if (!(rate > 0)) return;
-  const Real kept = std::exp(-rate * duration);
-  for (int i = 0; i < particles.size(); ++i) {
-    auto v = particles.velocities.col(i).head<3>();
-    v = mean + kept * (v - mean);
-  }
-  body.step_flows.drag += within / 2 * (1 - kept * kept);
 }
 
 void end_step(SteppedBody& body, Real duration) {

@@ -19,10 +19,6 @@ Real begin_step(SteppedBody& body, bool may_unfold = true);
 /// Goes back to the state that `begin_step` kept.
 void undo_step(SteppedBody& body);
 
-/// Slows the slow motion within a body that something holds up against gravity: what no material's damping stops, the
-/// sway of a tower and the rocking of a stack. The mean velocity stays.
-void settle(SteppedBody& body, Real duration);
-
 /// Takes the drag of a step and closes its books.
 void end_step(SteppedBody& body, Real duration);
 

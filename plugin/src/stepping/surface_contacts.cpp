@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contact_rules.h"
 
@@ -19,7 +20,8 @@ constexpr int fewest_substeps = 16;         // of a step in which surfaces are n
 constexpr int most_surface_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
-constexpr Real negligible_share = 3e-4;   // unless it is this small
+constexpr Real negligible_share = 3e-4;   // unless it is this small;
+constexpr Real quiet_share = 0.15;  // where bodies lie, none changes a speed by this share of a substep's fall, either
 
 }  // namespace
 
@@ -288,9 +290,25 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
     }
 }
 
+// That of a distance in a drift, relative to the thickness: where all is as slow as what settles, what sweeps leave is seen.
+Real SurfaceContacts::quiet_change(Real h) const {
+  constexpr Real round_off = 1e-7;
+  Real gravity = 0, thickness = std::numeric_limits<Real>::infinity();
+  for (const SteppedBody* body : island_.bodies) {
+    const Real fastest = body->options.settling_speed;
+    if (kinetic_energy(body->start.velocities, body->particles.inverse_masses) >=
+        body->mass / 2 * fastest * fastest * body->gravity.norm() * body->size)
+      return std::numeric_limits<Real>::infinity();
+    gravity = std::max(gravity, body->gravity.norm());
+  }
+  for (const TouchingPair& pair : scratch_.pairs) thickness = std::min(thickness, pair.thickness);
+  return std::max(quiet_share * gravity * h * h / thickness, round_off);
+}
+
 bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep) {
   bool changed = false;
   Real first = 0;
+  const Real quiet = quiet_change(h);
   start(since);
   for (int sweep = 0; sweep < most_surface_sweeps && !scratch_.pairs.empty(); ++sweep) {
     const bool again = rigid_sweep();
@@ -300,7 +318,7 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
     if (again) continue;
     if (!hit) break;
     if (first == 0) first = worst;
-    if (worst < tolerance && (worst < relative_tolerance * first || worst < negligible_share)) break;
+    if (worst < tolerance && worst < quiet && (worst < relative_tolerance * first || worst < negligible_share)) break;
   }
   for (int sweep = 0; rigid_sweep() && sweep < most_surface_sweeps; ++sweep) {
   }
@@ -312,10 +330,7 @@ bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep
     if (pair.memory)
       pair.memory->keep(pair.given * pair.axes.col(0) + pair.axes.rightCols<2>() * pair.rubbed, pair.axes.col(0),
                         since);
-    if (!(pair.given > 0)) continue;
-    changed = true;
-    for (const int body : {pair.body_a, pair.body_b}) island_.bodies[body]->is_pushed = true;
-    if (pair.rigid && !pair.rigid->is_dynamic()) island_.is_held_up = island_.is_held_up || pair.rigid->is_at_rest();
+    changed = changed || pair.given > 0;
   }
   return changed || !island_.contacts.empty() || !island_.rigid_contacts.empty();
 }

@@ -134,9 +134,14 @@ class SurfaceContacts {
   /// The particles were put back to where the step began; the work is forgotten.
   void undo();
 
-  /// Adds what touches at the end, and how deep, to the reports of the bodies, and what it gave to the records of the
-  /// island.
+  /// Adds what touches at the end, and how deep, to the reports of the bodies.
   void report();
+
+  /// Whether any has given something in this step.
+  bool has_given() const { return !is_empty() && !scratch_.records.empty(); }
+
+  /// Adds what features have given so far in this step; the same features may do so twice before the report.
+  void add_records(std::vector<ContactRecord>& records) const;
 
   /// Of giving thickness back, leading out, and of whoever drives what is held [J].
   Real outside_work() const { return outside_work_; }
@@ -149,6 +154,7 @@ class SurfaceContacts {
   void take_velocities();
   bool refresh(Real h, Real remaining);
   bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
+  Real quiet_change(Real h) const;
   void begin_sweeps();
   void collect(Real h);
   void add(const SurfaceContact& contact, const FeaturePair& q, const ClosestPoints& closest, const Vector3* leads_out,
@@ -179,7 +185,7 @@ class SurfaceContacts {
   void record(const TouchingFeatures& features, Real thickness, const Vector3& given);
   TouchingFeatures features_of(const SurfaceContact& contact, const FeaturePair& q, bool is_enclosed) const;
   void merge_records();
-  void report(const TouchingRecord& touching);
+  ContactRecord record_of(const TouchingRecord& touching) const;
   void report_enclosed(const SurfaceContact& contact);
   std::span<TouchingParticle> particles_of(const TouchingPair& pair) const {
     return std::span(scratch_.particles).subspan(pair.begin, pair.end - pair.begin);
@@ -215,5 +221,8 @@ class SurfaceContacts {
   long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step
   Real outside_work_ = 0;
 };
+
+/// Sets the records of the island to what all its contacts have given so far in this step.
+void find_records(Island& island, const SurfaceContacts& surfaces);
 
 }  // namespace penalty

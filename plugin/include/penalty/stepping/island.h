@@ -1,5 +1,6 @@
 // One world step of all that touches or holds one another: many explicit substeps, or one implicit one.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -52,11 +53,11 @@ struct SteppedBody {
   EnergyFlows step_flows;           // of the attempt at the present step
   std::optional<Real> last_energy;  // at the end of the last step [J]
   int last_substeps = 0;            // what the energy guard settled on
+  std::uint32_t num_steps = 0;      // begun; where a step damps follows from it
   Real mass = 0;                    // of the particles that are not pinned [kg]
   Real energy_noise = 0;            // growth of energy that means nothing [J]
   Real size = 0;                    // diagonal of the box about the rest shape [m]
   PackedVectors before_contacts;    // velocities [m/s]
-  bool is_pushed = false;           // by contacts, in this step
   Real pressing = 0;                // sizes of the impulses of contacts along their normals, in this step [N s]
   Particles start;                  // positions and velocities to go back to,
   FieldState start_state;           // and what flowed, broke and changed phase
@@ -110,7 +111,6 @@ struct Island {
   // What the integrator works in.
   std::vector<RigidBody> rigid_start = {};
   std::vector<char> touching = {};  // bodies that may touch something
-  bool is_held_up = false;          // something that is at rest for good pushed one of the bodies in this step
   std::shared_ptr<std::vector<ParticleContactRow>> particle_contact_rows = {};
   std::shared_ptr<SurfaceScratch> surface_scratch = {};
 };
@@ -129,13 +129,14 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 ///
 /// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with sweeps over the contacts before each drift and
 /// after the last kick: no velocity is handed out that contacts have not seen. At the start and the end positions and
-/// velocities belong to the same instant, and only there, or up to eight times a step on the way, is damping applied, see
-/// Damper: touched half a substep apart, it would feed the fastest modes. The number of substeps follows from the
+/// velocities belong to the same instant, and only there, or up to eight times a step on the way, is damping
+/// applied, see Damper: touched half a substep apart, it would feed the fastest modes. What lies is settled there, too, twice
+/// a step. The number of substeps follows from the
 /// stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That limit belongs to the rest shape; far
 /// from it a step may still gain energy. If kinetic + elastic energy, less the work of
 /// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
-/// many substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen at the
-/// end of a block, up to eight times a step; what they take is no growth.
+/// many substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen up to
+/// eight times a step; what they take is no growth.
 ///
 /// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
 /// end of a step.

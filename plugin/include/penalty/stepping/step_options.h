@@ -31,8 +31,8 @@ struct StepOptions {
   /// exp(-beta w² t / 2).
   Real damping_time = 0;
   Real drag = 0;  // rate at which all velocities decay [1/s]; does not keep momentum
-  /// What lies on something that is at rest, and moves within itself slower than this share of sqrt(g * size), comes to
-  /// rest. 0: only by damping and friction.
+  /// What something at rest holds, through other bodies too, and moves slower than this share of sqrt(g * size), comes
+  /// to rest, but for rigid motion that its contacts leave free. 0: only by damping and friction.
   Real settling_speed = 0.1;
   int substeps = 0;               // in a step; 0: from the stability limit; surfaces that meet fast take more
   Real safety = 0.99;             // share of the stability limit that a substep may use, in (0, 1]
