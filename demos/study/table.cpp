@@ -13,9 +13,10 @@ namespace {
 
 /// Where `name` is in a list of what has a name; behind all if it is not.
 template <class List, class Name>
-std::size_t place_in(const List& list, const std::string& name, const Name& name_of) {
-  const auto found = std::find_if(list.begin(), list.end(), [&](const auto& entry) { return name_of(entry) == name; });
-  return static_cast<std::size_t>(found - list.begin());
+std::size_t place_in(const List& named, const std::string& name, const Name& name_of) {
+  const auto found =
+      std::find_if(named.begin(), named.end(), [&](const auto& entry) { return name_of(entry) == name; });
+  return static_cast<std::size_t>(found - named.begin());
 }
 
 /// What rows are told apart and sorted by: as the program lists things, small meshes first.

@@ -325,8 +325,8 @@ int wanted_substeps(const Island& island, const SurfaceContacts& surfaces, Real 
     const SteppedBody& body = *island.bodies[k];
     int wanted = body.options.substeps;
     if (wanted == 0) {
-      const Real safety = island.touching[k] ? body.options.contact_safety : body.options.safety;
-      const Real limit = duration * std::sqrt(body.largest_eigenvalue + coupling_eigenvalue) / 2 / safety;
+      const Real share = island.touching[k] ? body.options.contact_safety : body.options.safety;
+      const Real limit = duration * std::sqrt(body.largest_eigenvalue + coupling_eigenvalue) / 2 / share;
       wanted = limit < body.options.max_substeps ? static_cast<int>(std::ceil(limit)) : body.options.max_substeps;
     }
     substeps = std::max({substeps, wanted, static_cast<int>(substep_memory * body.last_substeps)});
