@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 namespace penalty {
 namespace {
@@ -141,6 +142,7 @@ class Settling {
     }
     join();
     find_depths();
+    list();
   }
 
   bool run(Real duration) {
@@ -224,16 +226,35 @@ class Settling {
     }
   }
 
+  // Who is in each cluster, and what holds it, or lies on it.
+  void list() {
+    for (int k = 0; k < size_; ++k)
+      if (takes_part_[k]) members_.emplace_back(cluster_[k], k);
+    for (int k = 0; k < static_cast<int>(holds_.size()); ++k) {
+      const int a = cluster_[holds_[k].a], b = holds_[k].b < 0 ? -1 : cluster_[holds_[k].b];
+      if (a == b) continue;
+      holds_of_.emplace_back(a, k);
+      if (b >= 0) holds_of_.emplace_back(b, k);
+    }
+    std::sort(members_.begin(), members_.end());
+    std::sort(holds_of_.begin(), holds_of_.end());
+  }
+
+  // Of a cluster, from such a list.
+  static std::span<const std::pair<int, int>> entries(const std::vector<std::pair<int, int>>& of_all, int number) {
+    const auto first = std::lower_bound(of_all.begin(), of_all.end(), std::pair(number, 0));
+    return {first, std::lower_bound(first, of_all.end(), std::pair(number + 1, 0))};
+  }
+
   // The mean square speed of the contacts of a cluster with what holds it, times its mass, as a form in its velocity and
   // angular velocity.
   Matrix6 held_of(int number, const Cluster& cluster) const {
     Matrix6 held = Matrix6::Zero();
     Real pressing = 0;
-    for (const Hold& hold : holds_) {
-      const bool is_a = cluster_[hold.a] == number, is_b = hold.b >= 0 && cluster_[hold.b] == number;
-      if (is_a == is_b) continue;
-      if (hold.b >= 0 && depths_[cluster_[is_a ? hold.b : hold.a]] >= depths_[number])
-        continue;  // lies on it, or beside it
+    for (const auto& [of, place] : entries(holds_of_, number)) {
+      const Hold& hold = holds_[place];
+      const int other = cluster_[hold.a] == number ? hold.b : hold.a;
+      if (other >= 0 && depths_[cluster_[other]] >= depths_[number]) continue;  // lies on it, or beside it
       Eigen::Matrix<Real, 3, 6> velocity;
       velocity << Matrix3::Identity(), -cross_matrix(hold.point - cluster.center);
       if (hold.slides || hold.b >= 0) {  // of another cluster, it slides on the whole
@@ -249,8 +270,7 @@ class Settling {
 
   bool settle(int number, Real duration) {
     Cluster cluster;
-    for (int k = 0; k < size_; ++k) {
-      if (cluster_[k] != number || !takes_part_[k]) continue;
+    for (const auto& [of, k] : entries(members_, number)) {
       if (k < num_bodies_)
         cluster.soft.push_back(island_.bodies[k]);
       else
@@ -291,7 +311,8 @@ class Settling {
   int num_bodies_, size_;  // of all
   std::vector<char> takes_part_;
   std::vector<Hold> holds_;
-  std::vector<int> cluster_, depths_;  // the first of it; of that
+  std::vector<int> cluster_, depths_;                    // the first of it; of that
+  std::vector<std::pair<int, int>> members_, holds_of_;  // cluster, and number of the body or the hold
 };
 
 }  // namespace
