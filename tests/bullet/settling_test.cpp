@@ -4,13 +4,12 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real frame = 1.0 / 60;
 constexpr Material jelly{.young = 1e6, .poisson = 0.35};
 
 class Settling : public WorldTest {
  protected:
   void SetUp() override {
-    sim.set_gravity({0, -9.81, 0});
+    sim.set_gravity({0, -g, 0});
     sim.add_ground();
   }
 
