@@ -11,10 +11,10 @@ namespace {
 
 using std::numbers::pi;
 
-struct Margins {
+struct MarginPair {
   Real mesh, soft;
 };
-constexpr Margins all_margins[] = {{0.04, 0.02}, {0, 0.02}, {0, 0}};
+constexpr MarginPair all_margins[] = {{0.04, 0.02}, {0, 0.02}, {0, 0}};
 
 Vector3 center(const btSoftBody& body) {
   Vector3 sum = Vector3::Zero();
@@ -107,7 +107,7 @@ TEST_P(MeshSides, NothingLeavesAClosedRoom) {
 }
 
 TEST_P(MeshSides, DepthIsTakenBackOnTheSideWhereMostOfTheBodyIs) {
-  for (const Margins& margins : all_margins)
+  for (const MarginPair& margins : all_margins)
     for (const bool turned : {false, true})
       for (const Real down : {-1.0, 1.0}) {
         const auto most_substeps = [&](Real height_of_lowest) {
