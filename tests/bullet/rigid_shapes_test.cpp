@@ -56,6 +56,7 @@ class Landing : public WorldTest {
   }
 };
 
+// A ball on a ball, or on a ridge, rolls off: these are almost flat.
 TEST_P(Landing, Sphere) { land(std::make_unique<btSphereShape>(30), Matrix3::Identity(), 30); }
 
 TEST_P(Landing, Box) { land(std::make_unique<btBoxShape>(btVector3(1, 0.5, 1)), turned(0.4, Vector3::UnitY()), 0.5); }
@@ -65,7 +66,7 @@ TEST_P(Landing, BoxOnItsSide) {
 }
 
 TEST_P(Landing, Capsule) {
-  land(std::make_unique<btCapsuleShape>(btScalar(2), btScalar(2)), turned(pi / 2, Vector3::UnitX()), 2);
+  land(std::make_unique<btCapsuleShape>(btScalar(30), btScalar(2)), turned(pi / 2, Vector3::UnitX()), 30);
 }
 
 TEST_P(Landing, CylinderUpright) {
