@@ -21,7 +21,7 @@ constexpr int most_surface_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
 constexpr Real negligible_share = 3e-4;   // unless it is this small;
-constexpr Real quiet_share = 0.15;  // where bodies lie, none changes a speed by this share of a substep's fall, either
+constexpr Real unseen_share = 0.15;  // where bodies lie, none changes a speed by this share of a substep's fall, either
 
 }  // namespace
 
@@ -292,7 +292,7 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
 
 // That of a distance in a drift, relative to the thickness: where all is as slow as what settles, what sweeps leave is seen.
 Real SurfaceContacts::quiet_change(Real h) const {
-  constexpr Real round_off = 1e-7;
+  constexpr Real least_change = 1e-7;
   Real gravity = 0, thickness = std::numeric_limits<Real>::infinity();
   for (const SteppedBody* body : island_.bodies) {
     const Real fastest = body->options.settling_speed;
@@ -302,7 +302,7 @@ Real SurfaceContacts::quiet_change(Real h) const {
     gravity = std::max(gravity, body->gravity.norm());
   }
   for (const TouchingPair& pair : scratch_.pairs) thickness = std::min(thickness, pair.thickness);
-  return std::max(quiet_share * gravity * h * h / thickness, round_off);
+  return std::max(unseen_share * gravity * h * h / thickness, least_change);
 }
 
 bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep) {
