@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "face_tree.h"
+
 namespace penalty {
 namespace {
 
@@ -44,6 +46,7 @@ void HeldBody::read_nodes(Real duration) {
 
 void HeldBody::let_torn_faces_go() {
   if (!torn_faces.update(*body, field)) return;
+  keep_face_tree(*body);
   surface.reset();
   mesh_sides.forget();
 }
