@@ -80,6 +80,6 @@ step "$testing"
 LP_NUM_THREADS=1 ctest --preset "$preset" --parallel "$jobs" --no-tests=error "${ctest_arguments[@]}" 2>&1 | tee "$log"
 [ $whole = yes ] || exit 0
 step "fuzzing with sanitizers"
-bash tests/fuzz/run.sh --seconds 15 --seed 1 --jobs "$jobs"
+bash tests/fuzz/run.sh --seconds 10 --seed 1 --jobs "$jobs"
 step "linting"
 bash tests/tidy.sh --minutes 1 --no-install --jobs "$jobs"
