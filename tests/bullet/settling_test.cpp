@@ -1,4 +1,6 @@
 // What lies comes to rest with default settings.
+#include <cmath>
+
 #include "bullet/simulation.h"
 
 namespace penalty::testing {
@@ -22,6 +24,7 @@ class Settling : public WorldTest {
   // In a frame, from positions [m/s].
   Real largest_motion() {
     std::vector<PackedVectors> before;
+    before.reserve(bodies_.size());
     for (const btSoftBody* body : bodies_) before.push_back(sim.penalty().particles(*body).positions);
     sim.step(frame);
     Real largest = 0;
@@ -32,7 +35,7 @@ class Settling : public WorldTest {
   }
 
   void expect_to_lie_after(Real duration) {
-    sim.step(frame, static_cast<int>(duration / frame + 0.5));
+    sim.step(frame, static_cast<int>(std::lround(duration / frame)));
     for (int k = 0; k < 60; ++k) EXPECT_LT(largest_motion(), 0.005) << "frame " << k;
   }
 
