@@ -37,6 +37,7 @@ std::set<Triangle> sorted_all(const std::vector<Triangle>& triangles) {
 // Those of the body, or, of one that has none, those that the field is made of.
 std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field) {
   std::vector<Tetrahedron> tetrahedra;
+  tetrahedra.reserve(body.m_tetras.size());
   for (int k = 0; k < body.m_tetras.size(); ++k) tetrahedra.push_back(numbers_of(body, body.m_tetras[k].m_n));
   if (!tetrahedra.empty()) return tetrahedra;
   std::set<Tetrahedron> known;
@@ -83,6 +84,7 @@ bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
   const std::set<Triangle> bare_keys = sorted_all(bare), skin_keys = sorted_all(boundary_faces(tetrahedra));
 
   std::vector<Triangle> faces;  // of the body, when nothing is torn
+  faces.reserve(body.m_faces.size());
   for (int k = 0; k < body.m_faces.size(); ++k) faces.push_back(numbers_of(body, body.m_faces[k].m_n));
   for (const auto& [face, corners] : torn_) faces[face] = corners;
   std::vector<Torn> torn;

@@ -36,6 +36,7 @@ struct Hold {
   Vector3 point, normal;
   Real pressing = 0;
   bool slides = false;
+  int number = 0;  // in the order in which they were found
 
   std::pair<int, int> ends() const { return std::minmax({a, b}); }
 };
@@ -182,6 +183,7 @@ class Settling {
     if (!takes_part_[a] || !(takes_part_[b] || is_at_rest(b))) return;
     hold.a = a;
     hold.b = takes_part_[b] ? b : -1;
+    hold.number = static_cast<int>(holds_.size());
     holds_.push_back(hold);
   }
 
@@ -194,7 +196,9 @@ class Settling {
   void join() {
     cluster_.resize(size_);
     std::iota(cluster_.begin(), cluster_.end(), 0);
-    std::stable_sort(holds_.begin(), holds_.end(), [](const Hold& l, const Hold& m) { return l.ends() < m.ends(); });
+    std::sort(holds_.begin(), holds_.end(), [](const Hold& l, const Hold& m) {
+      return std::pair(l.ends(), l.number) < std::pair(m.ends(), m.number);
+    });
     for (std::size_t k = 0; k < holds_.size();) {
       const std::pair<int, int> ends = holds_[k].ends();
       Real clinging = 0;
