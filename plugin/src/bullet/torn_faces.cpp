@@ -80,7 +80,7 @@ bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
   std::vector<Tetrahedron> whole;
   for (const Tetrahedron& t : tetrahedra)
     if (!broken.cut(t)) whole.push_back(t);
-  const std::vector<Triangle> inner = faces_of(tetrahedra), bare = boundary_faces(whole);
+  const std::vector<Triangle> all = faces_of(tetrahedra), bare = boundary_faces(whole);
   const std::set<Triangle> bare_keys = sorted_all(bare), skin_keys = sorted_all(boundary_faces(tetrahedra));
 
   std::vector<Triangle> faces;  // of the body, when nothing is torn
@@ -90,7 +90,7 @@ bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
   std::vector<Torn> torn;
   for (int k = 0; k < static_cast<int>(faces.size()); ++k) {
     const Triangle key = sorted(faces[k]);
-    const bool is_of_tetrahedron = std::binary_search(inner.begin(), inner.end(), key);
+    const bool is_of_tetrahedron = std::binary_search(all.begin(), all.end(), key);
     if (is_of_tetrahedron ? !bare_keys.contains(key) : broken.cut(faces[k])) torn.push_back({k, faces[k]});
   }
   std::set<Triangle> known_keys = sorted_all(faces);

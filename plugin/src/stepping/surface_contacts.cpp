@@ -62,6 +62,7 @@ void SurfaceContacts::take_velocities() {
 void SurfaceContacts::begin_step(Real duration) {
   if (is_empty()) return;
   scratch_.records.clear();
+  quiet_gravity_ = gravity_of_quiet();
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     if (surfaces_[k]) surfaces_[k]->begin_step(island_.bodies[k]->particles.positions);
   for (const auto& [surface, body] : rigid_surfaces_) surface->begin_step(body->position, body->rotation);
@@ -290,10 +291,8 @@ void SurfaceContacts::lead_out(const SurfaceContact& contact) {
     }
 }
 
-// That of a distance in a drift, relative to the thickness: where all is as slow as what settles, what sweeps leave is seen.
-Real SurfaceContacts::quiet_change(Real h) const {
-  constexpr Real least_change = 1e-7;
-  Real gravity = 0, thickness = std::numeric_limits<Real>::infinity();
+Real SurfaceContacts::gravity_of_quiet() const {
+  Real gravity = 0;
   for (const SteppedBody* body : island_.bodies) {
     const Real fastest = body->options.settling_speed;
     if (kinetic_energy(body->start.velocities, body->particles.inverse_masses) >=
@@ -301,8 +300,15 @@ Real SurfaceContacts::quiet_change(Real h) const {
       return std::numeric_limits<Real>::infinity();
     gravity = std::max(gravity, body->gravity.norm());
   }
+  return gravity;
+}
+
+// That of a distance in a drift, relative to the thickness: where all is as slow as what settles, what sweeps leave is seen.
+Real SurfaceContacts::quiet_change(Real h) const {
+  constexpr Real least_change = 1e-7;  // round-off
+  Real thickness = std::numeric_limits<Real>::infinity();
   for (const TouchingPair& pair : scratch_.pairs) thickness = std::min(thickness, pair.thickness);
-  return std::max(unseen_share * gravity * h * h / thickness, least_change);
+  return std::max(unseen_share * quiet_gravity_ * h * h / thickness, least_change);
 }
 
 bool SurfaceContacts::converge(Real h, Real since, const RigidSweep& rigid_sweep) {

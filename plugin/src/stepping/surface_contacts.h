@@ -154,6 +154,7 @@ class SurfaceContacts {
   void take_velocities();
   bool refresh(Real h, Real remaining);
   bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
+  Real gravity_of_quiet() const;
   Real quiet_change(Real h) const;
   void begin_sweeps();
   void collect(Real h);
@@ -218,6 +219,7 @@ class SurfaceContacts {
   std::vector<char> may_touch_;      // each body
   std::vector<const SurfacePair*> held_inside_;  // what is too deep to be led out
   int least_substeps_ = 1;
+  Real quiet_gravity_ = 0;   // where all begins the step as slow as what settles, else infinite [m/s²]
   long freezing_tests_ = 0;  // of pairs, for zones of the guard, in this step
   Real outside_work_ = 0;
 };
