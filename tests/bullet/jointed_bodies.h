@@ -15,6 +15,13 @@ namespace penalty::testing {
 /// Rigid bodies, held by joints, and pads of jelly that they touch.
 class RigidJoints : public WorldTest {
  protected:
+  template <class Joint>
+  static void leave_free_along_y(Joint& joint) {
+    joint.setLinearLowerLimit({0, 1, 0});  // above the upper one: no limit
+    joint.setLinearUpperLimit({0, -1, 0});
+    joint.setAngularLowerLimit({0, 0, 0});
+    joint.setAngularUpperLimit({0, 0, 0});
+  }
   static btVector3 along_z() { return {0, 0, 1}; }
 
   static btTransform at_point(const Vector3& point) {

@@ -13,8 +13,9 @@ namespace penalty {
 /// Rows with limits (stops, motors) are swept over one by one, their impulses summed and clipped, each together with what
 /// the two-sided ones must answer: a motor turns a wheel that stays on its axle. The matrix is a narrow band where joints
 /// stand in the order of E. Cuthill and J. McKee, Reducing the Bandwidth of Sparse Symmetric Matrices (1969), reversed; nets
-/// in which it is too wide to be worth it are met joint by joint. Both bodies take the impulse on the same line, so both momenta are kept. The work of motors,
-/// of springs, of bodies that move and take no impulse, and of taking errors back is work from outside.
+/// in which it is too wide to be worth it are met joint by joint. Both bodies take the impulse on the same line, so both
+/// momenta are kept. The work of motors, of springs, of bodies that move and take no impulse, and of taking errors back is
+/// work from outside.
 class Joints {
  public:
   explicit Joints(Island& island);

@@ -129,14 +129,13 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 ///
 /// Explicitly: equal substeps of velocity Verlet (kick, drift, kick), with sweeps over the contacts before each drift and
 /// after the last kick: no velocity is handed out that contacts have not seen. At the start and the end positions and
-/// velocities belong to the same instant, and only there, or up to eight times a step on the way, is damping
-/// applied, see Damper: touched half a substep apart, it would feed the fastest modes. What lies is settled there, too, twice
-/// a step. The number of substeps follows from the
-/// stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That limit belongs to the rest shape; far
-/// from it a step may still gain energy. If kinetic + elastic energy, less the work of
-/// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as
-/// many substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen up to
-/// eight times a step; what they take is no growth.
+/// velocities belong to the same instant, and only there, or up to eight times a step on the way, is damping applied, see
+/// Damper: touched half a substep apart, it would feed the fastest modes. What lies is settled there, too, twice a step.
+/// The number of substeps follows from the stability limit 2 / sqrt(largest_eigenvalue) and the safety of each body. That
+/// limit belongs to the rest shape; far from it a step may still gain energy. If kinetic + elastic energy, less the work of
+/// gravity and obstacles, grows beyond the tolerance or is not finite, the step is undone and repeated with half as many
+/// substeps again; the next step starts from at least 0.8 of that number. Plastic flow and breaking happen up to eight
+/// times a step; what they take is no growth.
 ///
 /// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
 /// end of a step.
