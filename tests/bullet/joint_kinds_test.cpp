@@ -140,6 +140,7 @@ TEST_P(JointKinds, AChainThatBulletHasStretchedIsTakenOverWithoutAJerk) {
   const Real length = 0.1, top = 1.5;
   const btVector3 up(0, btScalar(length / 2), 0), down = -up;
   std::vector<btRigidBody*> links;
+  links.reserve(10);
   for (int k = 0; k < 10; ++k)
     links.push_back(&sim.add_box({0.03, 0.04, 0.03}, 1, {0.5, top - (k + 0.5) * length, 0.5}));
   add<btHingeConstraint>(*links[0], up, along_z());
