@@ -295,7 +295,7 @@ Real SurfaceContacts::gravity_of_quiet() const {
   Real gravity = 0;
   for (const SteppedBody* body : island_.bodies) {
     const Real fastest = body->options.settling_speed;
-    if (kinetic_energy(body->start.velocities, body->particles.inverse_masses) >=
+    if (kinetic_energy(body->particles.velocities, body->particles.inverse_masses) >=
         body->mass / 2 * fastest * fastest * body->gravity.norm() * body->size)
       return std::numeric_limits<Real>::infinity();
     gravity = std::max(gravity, body->gravity.norm());
