@@ -75,7 +75,8 @@ struct Drifting {
 // Edges are given as the search found them: either first.
 std::set<Key> visited(SurfacePair& pair) {
   std::set<Key> found;
-  pair.visit_near([&](const FeaturePair& q, Real) {
+  pair.visit_near([&](FeaturePair& q, Real) {
+    pair.find_difference(q);  // what is far by then is left out until it may have come near
     Key key = key_of(q);
     if (pair.is_self()) key[1] = 0;
     found.insert(key);

@@ -44,6 +44,18 @@ ClosestPoints SurfacePair::closest(const FeaturePair& q) const {
                                           two.position(p[3]));
 }
 
+ClosestPoints SurfacePair::find_closest(FeaturePair& q) const {
+  const ClosestPoints found = closest(q);
+  q.difference = found.difference;
+  q.distance = found.difference.norm();
+  q.found_at = instant();
+  return found;
+}
+
+void SurfacePair::find_difference(FeaturePair& q) const {
+  if (q.found_at != instant()) find_closest(q);
+}
+
 Real SurfacePair::rest_distance(const FeaturePair& q) const {
   const auto at = [&](int k) { return a_->rest_position(q.points[k]); };
   return (q.are_edges ? closest_points_of_edges(at(0), at(1), at(2), at(3))
@@ -57,8 +69,13 @@ Real SurfacePair::relative_speed(const Couple& c) const {
 }
 
 Real SurfacePair::used_since(const Couple& c, Real path, const Vector3& shift) const {
-  const SurfacePatch &a = patch_a(c), &b = patch_b(c);
-  return a.path + b.path - path + (b.shift - a.shift - shift).norm();
+  return path_of(c) - path + (shift_of(c) - shift).norm();
+}
+
+void SurfacePair::see_motion(Couple& c) const {
+  c.moved += used_since(c, c.path_seen, c.shift_seen);
+  c.path_seen = path_of(c);
+  c.shift_seen = shift_of(c);
 }
 
 // Of any two patches: twice the largest of one against all of them.
@@ -105,6 +122,7 @@ void SurfacePair::find_couples(Real within, Real ahead) {
       Couple& couple = couples.emplace_back();
       couple.a = i;
       couple.b = j;
+      see_motion(couple);
     });
   std::sort(couples.begin(), couples.end(), before);
   for (Couple& couple : couples) {
@@ -230,6 +248,7 @@ bool SurfacePair::refresh(Real h, Real remaining) {
   bool changed = false;
   has_near_ = false;
   for (Couple& c : couples_) {
+    see_motion(c);
     c.motion = h * relative_speed(c);
     c.used = c.is_refreshed ? used_since(c, c.path, c.shift) : 0;
     if (!c.is_refreshed || c.used + refresh_ahead * c.motion > c.room) {
@@ -255,20 +274,21 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
   c.near.clear();
   for (FeaturePair& q : c.candidates) {
     if (q.at_search - used > want) break;
-    q.at_refresh = closest(q).difference.norm();
+    find_difference(q);
+    q.floor = q.distance + c.moved;
     if (!q.is_measured) {
       q.thickness = std::min(q.thickness, rest_share * rest_distance(q));
       q.is_measured = true;
     }
     // What lies on each other at rest, as doubled vertices do, is no contact.
-    if (q.at_refresh >= q.thickness + c.room || q.thickness < apart_at_rest * edge_) continue;
+    if (q.distance >= q.thickness + c.room || q.thickness < apart_at_rest * edge_) continue;
     c.near.push_back(q);
     for (const FeaturePair& old : pressed_)
       if (old.points == q.points && old.are_edges == q.are_edges && old.from_b == q.from_b)
         std::tie(c.near.back().memory, c.near.back().record) = std::tie(old.memory, old.record);
   }
-  c.path = patch_a(c).path + patch_b(c).path;
-  c.shift = patch_b(c).shift - patch_a(c).shift;
+  c.path = path_of(c);
+  c.shift = shift_of(c);
   c.used = 0;
   c.is_refreshed = true;
 }
@@ -288,8 +308,8 @@ void SurfacePair::search(Couple& c, Real want, Real ahead) {
                      [](const FeaturePair& l, const FeaturePair& r) { return l.at_search < r.at_search; });
   }
   c.is_searched = true;
-  c.searched_path = patch_a(c).path + patch_b(c).path;
-  c.searched_shift = patch_b(c).shift - patch_a(c).shift;
+  c.searched_path = path_of(c);
+  c.searched_shift = shift_of(c);
 }
 
 // Points of one patch at triangles of the other.
@@ -332,7 +352,8 @@ void SurfacePair::add(Couple& c, FeaturePair q) const {
   if (may_pass(q)) return;
   q.thickness = kept_distance();
   q.is_measured = !is_self();
-  q.at_search = closest(q).difference.norm();
+  find_difference(q);
+  q.at_search = q.distance;
   if (q.at_search <= c.reach) c.candidates.push_back(q);
 }
 

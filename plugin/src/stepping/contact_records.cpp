@@ -102,10 +102,10 @@ ContactRecord SurfaceContacts::record_of(const TouchingRecord& touching) const {
   const TouchingFeatures& features = touching.features;
   const SurfaceContact& contact = island_.surfaces[features.contact];
   const SurfacePair& pair = *contact.pair;
-  const FeaturePair q{.points = features.points, .are_edges = features.are_edges, .from_b = features.from_b};
+  FeaturePair q{.points = features.points, .are_edges = features.are_edges, .from_b = features.from_b};
   const ContactSurface &one = pair.first(q), &two = pair.second(q);
-  const ClosestPoints closest = pair.closest(q);
-  const Real distance = closest.difference.norm();
+  const ClosestPoints closest = pair.find_closest(q);
+  const Real distance = q.distance;
   const int size_of_first = q.are_edges ? 2 : 1;
   Vector3 at_first = Vector3::Zero(), at_second = Vector3::Zero();
   for (int k = 0; k < 4; ++k)

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "surface_contacts.h"
@@ -10,9 +11,10 @@
 namespace penalty {
 namespace {
 
-constexpr Real kept_share = 0.1;   // of the distance, or of the thickness, that a drift must leave
-constexpr Real no_moment = 1e-13;  // of inertia, relative to the largest
-constexpr int extra_sweeps = 8;    // before what fails is frozen
+constexpr Real kept_share = 0.1;  // of the distance, or of the thickness, that a drift must leave
+constexpr Real unknown_reach = std::numeric_limits<Real>::infinity();
+constexpr Real no_moment = 1e-13;                                 // of inertia, relative to the largest
+constexpr int extra_sweeps = 8;                                   // before what fails is frozen
 constexpr long most_tests = 20000, most_tests_of_particle = 100;  // of pairs, for zones, in a step
 
 // Least distance along n of points of the first feature from those of the second.
@@ -56,43 +58,42 @@ bool SurfaceContacts::is_beyond_help() const {
 void SurfaceContacts::find_failing(Real h) {
   scratch_.failing.clear();
   for (const SurfaceContact& contact : island_.surfaces)
-    contact.pair->visit_near([&](const FeaturePair& q, Real) {
+    contact.pair->visit_near([&](FeaturePair& q, Real reach) {
       const FailingPair pair{&contact, &q};
-      if (!(!zone_.empty() && is_in_one_zone(pair)) && !is_safe(contact, q, h)) scratch_.failing.push_back(pair);
+      if (!(!zone_.empty() && is_in_one_zone(pair)) && !is_safe(contact, q, h, reach)) scratch_.failing.push_back(pair);
     });
 }
 
-bool SurfaceContacts::is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const {
-  const ContactSurface &one = contact.pair->first(q), &two = contact.pair->second(q);
-  const int size_of_first = q.are_edges ? 2 : 1;
-  std::array<Vector3, 4> x, v;
-  for (int k = 0; k < 4; ++k) {
-    const ContactSurface& surface = k < size_of_first ? one : two;
-    x[k] = surface.position(q.points[k]);
-    v[k] = surface.velocity(q.points[k]);
-  }
-  const auto closest = [&] {
-    return (q.are_edges ? closest_points_of_edges(x[0], x[1], x[2], x[3])
-                        : closest_points_of_triangle(x[0], x[1], x[2], x[3]))
-        .difference;
-  };
-  const Vector3 before = closest();
-  const Real distance = before.norm();
-  if (contact.pair->has_no_direction(q, distance)) return true;
-  const Real bend = one.bend(h) + two.bend(h);
-  Real relative2 = 0;
-  for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
-  const Real radius = contact.pair->b().radius();
+// Two features that come together by less than what is between them have a plane between them all the time, and so have
+// those of which no point moves so far against one of them. `reach`: what the distance can change by.
+bool SurfaceContacts::is_safe(const SurfaceContact& contact, FeaturePair& q, Real h, Real reach) const {
+  const SurfacePair& surfaces = *contact.pair;
+  surfaces.find_difference(q);
+  const Real distance = q.distance;
+  if (surfaces.has_no_direction(q, distance)) return true;
+  const Real radius = surfaces.b().radius(), bend = surfaces.b().bend(h);
   const Real kept = std::min(
       distance, std::max(radius + kept_share * std::min(std::max<Real>(distance - radius, 0), q.thickness - radius),
-                         2 * contact.pair->least_distance(q)));
+                         2 * surfaces.least_distance(q)));
+  if (reach + bend < distance - kept) return true;
+  const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
+  const auto surface_of = [&](int k) -> const ContactSurface& { return k < (q.are_edges ? 2 : 1) ? one : two; };
+  std::array<Vector3, 4> v;
+  for (int k = 0; k < 4; ++k) v[k] = surface_of(k).velocity(q.points[k]);
+  Real relative2 = 0;
+  for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
   if (2 * h * std::sqrt(relative2) < distance - kept) return true;
-  const std::array<Vector3, 4> start = x;
-  for (int k = 0; k < 4; ++k) x[k] += h * v[k];
-  if (separation(before / distance, start, q.are_edges) > 0 &&
-      separation(before / distance, x, q.are_edges) >= kept + bend)
+  std::array<Vector3, 4> start, x;
+  for (int k = 0; k < 4; ++k) {
+    start[k] = surface_of(k).position(q.points[k]);
+    x[k] = start[k] + h * v[k];
+  }
+  if (separation(q.difference / distance, start, q.are_edges) > 0 &&
+      separation(q.difference / distance, x, q.are_edges) >= kept + bend)
     return true;
-  const Vector3 after = closest();
+  const Vector3 after = (q.are_edges ? closest_points_of_edges(x[0], x[1], x[2], x[3])
+                                     : closest_points_of_triangle(x[0], x[1], x[2], x[3]))
+                            .difference;
   const Real distance_after = after.norm();
   return distance_after >= kept + bend && distance_after > 0 &&
          separation(after / distance_after, start, q.are_edges) > 0;
@@ -147,7 +148,7 @@ void SurfaceContacts::freeze(Real h) {
   }
   std::vector<std::vector<FailingPair>> pairs_of(count);
   for (const SurfaceContact& contact : island_.surfaces)
-    contact.pair->visit_near([&](const FeaturePair& q, Real) {
+    contact.pair->visit_near([&](FeaturePair& q, Real) {
       const FailingPair pair{&contact, &q};
       visit_particles(pair, [&](int particle) { pairs_of[particle].push_back(pair); });
     });
@@ -186,7 +187,7 @@ void SurfaceContacts::freeze(Real h) {
     freezing_tests_ += static_cast<long>(again.size());
     if (is_beyond_help()) return;
     for (const FailingPair& pair : again)
-      if (!is_in_one_zone(pair) && !is_safe(*pair.contact, *pair.features, h)) failing.push_back(pair);
+      if (!is_in_one_zone(pair) && !is_safe(*pair.contact, *pair.features, h, unknown_reach)) failing.push_back(pair);
   }
 }
 

@@ -157,7 +157,7 @@ void SurfaceContacts::collect(Real h) {
   scratch_.particles.clear();
   for (const SurfaceContact& contact : island_.surfaces) {
     contact.pair->visit_near([&](FeaturePair& q, Real reach) {
-      const ClosestPoints closest = contact.pair->closest(q);
+      const ClosestPoints closest = contact.pair->find_closest(q);
       if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
       const Real limit = q.thickness + reach;
       if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory, &q.record);

@@ -69,7 +69,7 @@ inline Eigen::Map<const Vector3> vector(const Real* p) { return Eigen::Map<const
 /// What fails the guard: a pair of features, and where it comes from.
 struct FailingPair {
   const SurfaceContact* contact;
-  const FeaturePair* features;
+  FeaturePair* features;
 };
 
 /// Memory that is kept between steps.
@@ -196,7 +196,7 @@ class SurfaceContacts {
   void guard(Real h, Real remaining, const RigidSweep& rigid_sweep);
   bool is_beyond_help() const;
   void find_failing(Real h);
-  bool is_safe(const SurfaceContact& contact, const FeaturePair& q, Real h) const;
+  bool is_safe(const SurfaceContact& contact, FeaturePair& q, Real h, Real reach) const;
   void freeze(Real h);
   void join(std::span<const int> numbers, std::span<const std::vector<FailingPair>> pairs_of);
   void make_rigid(std::span<const int> numbers);

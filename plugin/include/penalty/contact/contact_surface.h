@@ -82,6 +82,9 @@ class ContactSurface {
   void forget();
   std::uint64_t epoch() const { return epoch_; }
 
+  /// Grows whenever positions are taken.
+  std::uint64_t instant() const { return instant_; }
+
   Vector3 position(int point) const { return positions_.col(point).head<3>(); }
   Vector3 velocity(int point) const { return velocities_.col(point).head<3>(); }
   Vector3 rest_position(int point) const { return rest_.col(point).head<3>(); }

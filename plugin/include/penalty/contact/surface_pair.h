@@ -1,5 +1,7 @@
 // What is near what between two surfaces, or within one: kept from substep to substep, and from step to step.
 #pragma once
+#include <cstdint>
+
 #include "penalty/contact/closest_points.h"
 #include "penalty/contact/contact.h"
 #include "penalty/contact/contact_surface.h"
@@ -10,13 +12,16 @@ namespace penalty {
 struct FeaturePair {
   std::array<int, 4> points;  // point, triangle; or edge, edge
   bool are_edges;
-  bool from_b = false;                 // the first feature belongs to surface b, the second to a
-  bool is_lone = false;                // edges of which one is of no triangle
-  bool is_measured = false;            // `thickness` is final
-  Real thickness = 0;                  // distance that is kept, the radius of a rigid surface included [m]
-  Real at_refresh = 0, at_search = 0;  // distance then [m]
-  ContactMemory memory = {};           // of an impulse on the first
-  int record = -1;                     // number of what it gave in the step, if it is that of these features
+  bool from_b = false;                   // the first feature belongs to surface b, the second to a
+  bool is_lone = false;                  // edges of which one is of no triangle
+  bool is_measured = false;              // `thickness` is final
+  Real thickness = 0;                    // distance that is kept, the radius of a rigid surface included [m]
+  Real at_search = 0;                    // distance then [m]
+  Vector3 difference = Vector3::Zero();  // between the closest points when they were found last [m],
+  Real distance = 0, floor = 0;          // how long it was, and that with all that its patches had moved until then [m]
+  std::uint64_t found_at = 0;
+  ContactMemory memory = {};  // of an impulse on the first
+  int record = -1;            // number of what it gave in the step, if it is that of these features
 };
 
 /// A point of one surface that lies inside the other, which is closed.
@@ -67,13 +72,21 @@ class SurfacePair {
   /// than what the coming drift can change.
   template <class Visit>
   void visit_near(const Visit& visit) {
-    for (Couple& couple : couples_)
-      for (FeaturePair& q : couple.near)
-        if (q.at_refresh - couple.used <= q.thickness + motion_reserve * couple.motion)
-          visit(q, motion_reserve * couple.motion);
+    for (Couple& couple : couples_) {
+      const Real reach = motion_reserve * couple.motion;
+      for (FeaturePair& q : couple.near) {
+        if (q.floor - couple.moved > q.thickness + reach) continue;
+        visit(q, reach);
+        if (q.found_at == instant()) q.floor = q.distance + couple.moved;
+      }
+    }
   }
 
   ClosestPoints closest(const FeaturePair& q) const;
+  /// The same; the difference is kept in the pair.
+  ClosestPoints find_closest(FeaturePair& q) const;
+  /// Sets no more than the difference, if it is not that of where they are.
+  void find_difference(FeaturePair& q) const;
 
   /// Whether features at this distance [m] lie on each other: the way between their points is round-off, and its direction
   /// says nothing. Closed surfaces know their outside, so they can afford to ask for more.
@@ -97,8 +110,14 @@ class SurfacePair {
     Real path = 0, searched_path = 0;  // of both, when refreshed and searched
     Vector3 shift = Vector3::Zero(), searched_shift = Vector3::Zero();  // of b against a
     Real used = 0, motion = 0;  // what distances may have changed since the refresh, and can in this drift
+    Real moved = 0;             // what they can have changed by since it was found, by sums of all motions:
+    Real path_seen = 0;         // of those until here
+    Vector3 shift_seen = Vector3::Zero();
     std::vector<FeaturePair> candidates, near;  // candidates by distance
   };
+
+  /// Both only grow: the sum tells whether either did.
+  std::uint64_t instant() const { return a_->instant() + b_->instant(); }
 
   const SurfacePatch& patch_a(const Couple& c) const { return a_->patches()[c.a]; }
   const SurfacePatch& patch_b(const Couple& c) const { return b_->patches()[c.b]; }
@@ -118,6 +137,9 @@ class SurfacePair {
   Real used_by_patches() const;
   void find_couples(Real within, Real ahead);
   Real relative_speed(const Couple& c) const;
+  Real path_of(const Couple& c) const { return patch_a(c).path + patch_b(c).path; }
+  Vector3 shift_of(const Couple& c) const { return patch_b(c).shift - patch_a(c).shift; }
+  void see_motion(Couple& c) const;
   Real used_since(const Couple& c, Real path, const Vector3& shift) const;
   void forget();
   void untangle();
