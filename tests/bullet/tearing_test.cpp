@@ -58,6 +58,20 @@ class Tearing : public WorldTest {
 
 Vector3 at(const btSoftBody& body, int node) { return to_vector(body.m_nodes[node].m_x); }
 
+// Twice the area of all faces, and the volume that they enclose.
+std::pair<Vector3, Real> enclosed_by_faces(const btSoftBody& body) {
+  Vector3 area = Vector3::Zero();
+  Real volume = 0;
+  for (int k = 0; k < body.m_faces.size(); ++k) {
+    Vector3 x[3];
+    for (int c = 0; c < 3; ++c) x[c] = to_vector(body.m_faces[k].m_n[c]->m_x);
+    const Vector3 twice = (x[1] - x[0]).cross(x[2] - x[0]);
+    area += twice;
+    volume += x[0].dot(twice) / 6;
+  }
+  return {area, volume};
+}
+
 TEST_P(Tearing, RaysPassFacesOfBrokenSpringsUntilTheseAreMended) {
   const TriangleSurface sheet = flat_sheet(8);
   btSoftBody& body = add_sheet(sim, sheet);
@@ -131,17 +145,10 @@ TEST_P(Tearing, TheFacesBehindBrokenTetrahedraCloseTheBody) {
   }
   sim.step(frame);
 
-  Vector3 area = Vector3::Zero();
-  Real by_faces = 0, by_tetrahedra = 0;
+  const auto [area, by_faces] = enclosed_by_faces(body);
+  Real by_tetrahedra = 0;
   int num_whole = 0;
-  for (int k = 0; k < body.m_faces.size(); ++k) {
-    Vector3 x[3];
-    for (int c = 0; c < 3; ++c) x[c] = to_vector(body.m_faces[k].m_n[c]->m_x);
-    const Vector3 twice = (x[1] - x[0]).cross(x[2] - x[0]);
-    area += twice / 2;
-    by_faces += x[0].dot(twice) / 6;
-    num_whole += body.m_faces[k].m_n[0] != body.m_faces[k].m_n[1];
-  }
+  for (int k = 0; k < body.m_faces.size(); ++k) num_whole += body.m_faces[k].m_n[0] != body.m_faces[k].m_n[1];
   for (const auto& [a, b, c, d] : whole)
     by_tetrahedra += (at(body, b) - at(body, a)).dot((at(body, c) - at(body, a)).cross(at(body, d) - at(body, a))) / 6;
   EXPECT_LT(area.norm(), limit(1e-12, 1e-6));
@@ -151,6 +158,37 @@ TEST_P(Tearing, TheFacesBehindBrokenTetrahedraCloseTheBody) {
   EXPECT_LT(num_whole, body.m_faces.size());
   // From above into the notch, and beside it.
   EXPECT_NEAR(2 * hit(body, {0.8, 2, 0.83}, {0.8, 0, 0.83}), 2 - stretch / 2, 0.02);
+  EXPECT_NEAR(2 * hit(body, {0.3, 2, 0.33}, {0.3, 0, 0.33}), 2 - stretch, 0.02);
+}
+
+TEST_P(Tearing, FacesLookOutOfWhatIsLeftAndAreGivenBack) {
+  const TetMesh box = make_box({1, 1, 1}, {4, 4, 4});
+  btSoftBody& body = sim.add(make_soft_body(sim.info(), box, {.mass = 10}));
+  const int skin = body.m_faces.size();
+  PotentialField field(box.vertices);
+  field.add<TetrahedronVolume>(box.tetrahedra, 0.01);
+  pull(body);
+  sim.penalty().attach(body, std::move(field));
+  const auto is_above = [&](int e) {
+    Real sum = 0;
+    for (const int i : box.tetrahedra[e]) sum += box.vertices(1, i);
+    return sum / 4 > 0.5;
+  };
+  for (const bool above : {true, false, true}) {  // the half that goes; the other is mended
+    Batch<TetrahedronVolume>& volumes = sim.penalty().edit(body).batch<TetrahedronVolume>();
+    for (int e = 0; e < static_cast<int>(box.tetrahedra.size()); ++e) {
+      volumes.set_breaking(e, {.upper = is_above(e) == above ? 0.01 : 10});
+      volumes.set_enabled(e, true);
+    }
+    sim.step(frame);
+    const auto [area, volume] = enclosed_by_faces(body);
+    EXPECT_LT(area.norm(), limit(1e-12, 1e-6));
+    EXPECT_NEAR(volume, std::pow(stretch, 3) / 2, 1e-3) << (above ? "below" : "above");
+    EXPECT_GT(body.m_faces.size(), skin);
+  }
+  sim.penalty().detach(body);
+  EXPECT_EQ(body.m_faces.size(), skin);
+  EXPECT_NEAR(enclosed_by_faces(body).second, std::pow(stretch, 3), 1e-3);
   EXPECT_NEAR(2 * hit(body, {0.3, 2, 0.33}, {0.3, 0, 0.33}), 2 - stretch, 0.02);
 }
 

@@ -88,6 +88,7 @@ AttachedBody AttachedBodies::attach(btSoftBody& body, PotentialField field, cons
 
 void AttachedBodies::detach(const btSoftBody& body) {
   attached_->couplings.remove_all_of(body);
+  if (HeldBody* held = attached_->bodies->find(body)) held->give_faces_back();
   attached_->bodies->remove(body);
 }
 

@@ -51,6 +51,12 @@ void HeldBody::let_torn_faces_go() {
   mesh_sides.forget();
 }
 
+void HeldBody::give_faces_back() {
+  if (!torn_faces.give_back(*body)) return;
+  body->m_fdbvt.clear();  // its leaves have the boxes of the faces that were torn
+  keep_face_tree(*body);
+}
+
 void HeldBody::measure() {
   const Particles& particles = stepped.particles;
   box = {};

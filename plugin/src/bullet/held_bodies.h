@@ -75,6 +75,9 @@ struct HeldBody {
   /// Lets the faces go that what broke in the step held, and their contact with them.
   void let_torn_faces_go();
 
+  /// What is not attached any more has all its faces.
+  void give_faces_back();
+
   /// Finds the box and the largest speed, once for all who ask where the body may come in the step.
   void measure();
 

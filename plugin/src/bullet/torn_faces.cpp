@@ -3,6 +3,7 @@
 #include <BulletSoftBody/btSoftBody.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "convert.h"
@@ -28,10 +29,11 @@ std::array<int, N> sorted(std::array<int, N> numbers) {
   return numbers;
 }
 
-std::set<Triangle> sorted_all(const std::vector<Triangle>& triangles) {
-  std::set<Triangle> keys;
-  for (const Triangle& t : triangles) keys.insert(sorted(t));
-  return keys;
+// By their sorted corners.
+std::map<Triangle, Triangle> by_corners(const std::vector<Triangle>& triangles) {
+  std::map<Triangle, Triangle> sorted_ones;
+  for (const Triangle& t : triangles) sorted_ones.emplace(sorted(t), t);
+  return sorted_ones;
 }
 
 // Those of the body, or, of one that has none, those that the field is made of.
@@ -51,6 +53,10 @@ std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialFi
     add(dynamic_cast<const Batch<StableNeoHookean>*>(potential.get()));
   }
   return tetrahedra;
+}
+
+void set_corners(btSoftBody& body, int face, const Triangle& corners) {
+  for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[k]];
 }
 
 void append_face(btSoftBody& body, const Triangle& corners, const PackedVectors& rest) {
@@ -80,30 +86,46 @@ bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
   std::vector<Tetrahedron> whole;
   for (const Tetrahedron& t : tetrahedra)
     if (!broken.cut(t)) whole.push_back(t);
-  const std::vector<Triangle> all = faces_of(tetrahedra), bare = boundary_faces(whole);
-  const std::set<Triangle> bare_keys = sorted_all(bare), skin_keys = sorted_all(boundary_faces(tetrahedra));
+  const std::vector<Triangle> all = faces_of(tetrahedra);
+  const std::map<Triangle, Triangle> bare = by_corners(boundary_faces(whole)),
+                                     skin = by_corners(boundary_faces(tetrahedra));
 
+  const int size = body.m_faces.size();
+  std::erase_if(torn_, [size](const Torn& t) { return t.face >= size; });  // others may have changed them
+  if (size != size_) own_size_ = size;
   std::vector<Triangle> faces;  // of the body, when nothing is torn
-  faces.reserve(body.m_faces.size());
-  for (int k = 0; k < body.m_faces.size(); ++k) faces.push_back(numbers_of(body, body.m_faces[k].m_n));
+  faces.reserve(size);
+  for (int k = 0; k < size; ++k) faces.push_back(numbers_of(body, body.m_faces[k].m_n));
   for (const auto& [face, corners] : torn_) faces[face] = corners;
   std::vector<Torn> torn;
-  for (int k = 0; k < static_cast<int>(faces.size()); ++k) {
+  for (int k = 0; k < size; ++k) {
     const Triangle key = sorted(faces[k]);
     const bool is_of_tetrahedron = std::binary_search(all.begin(), all.end(), key);
-    if (is_of_tetrahedron ? !bare_keys.contains(key) : broken.cut(faces[k])) torn.push_back({k, faces[k]});
+    const auto found = bare.find(key);
+    if (is_of_tetrahedron ? found == bare.end() : broken.cut(faces[k]))
+      torn.push_back({k, faces[k]});
+    else if (is_of_tetrahedron && k >= own_size_)
+      faces[k] = found->second;  // the other of its two tetrahedra may be the one that is left
   }
-  std::set<Triangle> known_keys = sorted_all(faces);
-  known_keys.insert(skin_keys.begin(), skin_keys.end());
+  const std::map<Triangle, Triangle> known = by_corners(faces);
 
-  for (const auto& [face, corners] : torn_)
-    for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[k]];
-  for (const auto& [face, corners] : torn)
-    for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[0]];
-  for (const Triangle& face : bare)
-    if (!known_keys.contains(sorted(face))) append_face(body, face, field.rest_positions());
+  for (int k = 0; k < size; ++k) set_corners(body, k, faces[k]);
+  for (const auto& [face, corners] : torn) set_corners(body, face, {corners[0], corners[0], corners[0]});
+  for (const auto& [key, face] : bare)
+    if (!known.contains(key) && !skin.contains(key)) append_face(body, face, field.rest_positions());
+  size_ = body.m_faces.size();
   torn_ = std::move(torn);
   count_ = count;
+  return true;
+}
+
+bool TornFaces::give_back(btSoftBody& body) {
+  const bool appended = body.m_faces.size() == size_ && size_ > own_size_;
+  if (torn_.empty() && !appended) return false;
+  for (const auto& [face, corners] : torn_)
+    if (face < body.m_faces.size()) set_corners(body, face, corners);
+  while (appended && body.m_faces.size() > own_size_) body.m_faces.pop_back();
+  *this = {};
   return true;
 }
 

@@ -11,7 +11,7 @@ namespace penalty {
 
 /// Faces go with the elements that hold them: those that what broke cuts, and those of tetrahedra that it cuts. A torn face
 /// keeps its number, but all its corners are its first node: rays pass, nothing of it is drawn, no air pushes it. It is whole
-/// again when its elements are. The faces behind tetrahedra that went are appended.
+/// again when its elements are. The faces behind tetrahedra that went are appended; they look out of what is left.
 class TornFaces {
  public:
   struct Torn {
@@ -22,11 +22,16 @@ class TornFaces {
   /// Returns whether faces changed.
   bool update(btSoftBody& body, const PotentialField& field);
 
+  /// Makes all faces whole and removes those that were appended, unless others appended some after them.
+  /// Returns whether faces changed.
+  bool give_back(btSoftBody& body);
+
   const std::vector<Torn>& torn() const { return torn_; }
 
  private:
   std::vector<Torn> torn_;
-  BreakCount count_;  // at which they were
+  int own_size_ = 0, size_ = 0;  // faces that the body has without those that were appended here, and with them
+  BreakCount count_;             // at which they were
 };
 
 }  // namespace penalty
