@@ -1,6 +1,7 @@
 // Kelvin-Voigt damping in the step: a mode of frequency w decays at beta w²/2, whatever the mesh and the substeps.
 #include <Eigen/Eigenvalues>
 
+#include "penalty/stepping/damper.h"
 #include "stepping/islands.h"
 
 namespace penalty::testing {
@@ -99,6 +100,46 @@ TEST(Damping, BeyondWhatAStepCanGiveSaysHowMuchThereWas) {
   const Real of_much = share(1e4), of_more = share(2e4);
   EXPECT_LT(of_much, 0.5);
   EXPECT_NEAR(of_more, of_much / 2, 1e-3 * of_much);
+}
+
+// Whoever moves the held end at V gives V times the momentum that comes in: no more can there be of energy.
+TEST(Damping, TakesNoEnergyOutOfNowhereWhereAnEndIsDriven) {
+  Random random(3);
+  Real most_growth = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    Body bar = make_beam_body(1);
+    Particles& particles = bar.particles();
+    const Vector3 v(30, 0, 0);
+    Real kinetic = 0;
+    Vector3 momentum = Vector3::Zero();
+    const auto count = [&](Real sign) {
+      for (int i = 0; i < particles.size(); ++i)
+        if (const Real inverse_mass = particles.inverse_masses[i]; inverse_mass > 0) {
+          kinetic += sign * bar.velocity(i).squaredNorm() / inverse_mass / 2;
+          momentum += sign * bar.velocity(i) / inverse_mass;
+        }
+    };
+    for (int i = 0; i < particles.size(); ++i) {
+      if (bar.position(i).x() < 0.5) particles.inverse_masses[i] = 0;
+      bar.set_velocity(i, particles.inverse_masses[i] == 0 ? v : random.vector(1));
+    }
+    Damper damper;
+    damper.begin_step();
+    for (int block = 0; block < 4; ++block) {  // the body is torn about within one step
+      for (int i = 0; i < particles.size(); ++i) bar.set_position(i, bar.position(i) + random.vector(0.3 * block));
+      kinetic = 0;
+      momentum.setZero();
+      count(-1);
+      const Damper::Damped damped = damper.damp(*bar.field, 0.05, 1.0 / 240, particles);
+      count(1);
+      const Real work = v.dot(momentum);
+      ASSERT_LE(kinetic, work + 1e-9 * std::abs(work)) << "trial " << trial << ", block " << block;
+      EXPECT_NEAR(damped.driving_work, work, 1e-9 * std::abs(work));
+      EXPECT_NEAR(damped.lost, work - kinetic, 1e-9 * std::abs(work));
+      most_growth = std::max(most_growth, kinetic);
+    }
+  }
+  EXPECT_GT(most_growth, 1) << "the end did not pull";
 }
 
 TEST(Damping, OfElementsMayBeSetLater) {

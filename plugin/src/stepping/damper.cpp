@@ -74,7 +74,7 @@ void Damper::prepare(const PotentialField& field, Real damping_time, const Parti
   is_prepared_ = true;
 }
 
-// Leaves in `now_` what the velocities become. The recurrence is that of what has been changed so far: round-off in the
+// Leaves in `now_` what the velocities become, and in `change_` the changes, of what is held the impulse on it. The recurrence is that of what has been changed so far: round-off in the
 // velocities themselves would grow with the square of the stages.
 void Damper::run_stages(int stages, Real share, const Particles& particles) {
   const Real d = damping_parameter / stages;
@@ -87,10 +87,9 @@ void Damper::run_stages(int stages, Real share, const Particles& particles) {
   const auto stage = [&](Real a, Real b, Real c) {
     modes_.add_product(now_, product_);
     for (int i = 0; i < particles.size(); ++i) {
-      if (const Real inverse_mass = particles.inverse_masses[i]; inverse_mass > 0) {
-        change_before_.col(i) = a * change_.col(i) + b * change_before_.col(i) - (c * inverse_mass) * product_.col(i);
-        now_.col(i) = particles.velocities.col(i) + change_before_.col(i);
-      }
+      const Real inverse_mass = particles.inverse_masses[i], divisor = inverse_mass > 0 ? inverse_mass : 1;
+      change_before_.col(i) = a * change_.col(i) + b * change_before_.col(i) - (c * divisor) * product_.col(i);
+      if (inverse_mass > 0) now_.col(i) = particles.velocities.col(i) + change_before_.col(i);
       product_.col(i).setZero();
     }
     change_.swap(change_before_);
@@ -104,10 +103,18 @@ void Damper::run_stages(int stages, Real share, const Particles& particles) {
   }
 }
 
-Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real duration, bool are_driven,
-                            Particles& particles) {
+// Of |R_s| <= 1 follows that the energy grows by no more than this, whatever the velocities of what is held: the part of
+// them that the damping of what is free has come to terms with takes work and keeps its energy, the rest decays.
+Real Damper::work_of_what_is_held(const Particles& particles) const {
+  Real work = 0;
+  for (int i = 0; i < particles.size(); ++i)
+    if (particles.inverse_masses[i] == 0) work -= particles.velocities.col(i).dot(change_.col(i));
+  return work;
+}
+
+Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real duration, Particles& particles) {
   const Real kinetic = kinetic_energy(particles);
-  if (!(kinetic > 0) || !std::isfinite(kinetic)) return {};
+  if (particles.velocities.isZero(0) || !std::isfinite(kinetic)) return {};
   Damped damped;
   prepare(field, damping_time, particles);
   if (rest_bound_ > 0) {
@@ -120,18 +127,23 @@ Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real
     damped.share = 0;
     for (int tries = 0; tries < most_tries && damped.share == 0; ++tries) {
       run_stages(stages, share, particles);
-      if (are_driven || kinetic_energy(now_, particles.inverse_masses) <= kinetic * (1 + 1e-12)) {
+      const Real work = work_of_what_is_held(particles);
+      if (kinetic_energy(now_, particles.inverse_masses) <= kinetic + work + 1e-12 * (kinetic + std::abs(work))) {
         particles.velocities = now_;  // not swapped: contacts point into it
         damped.share = share;
+        damped.driving_work = work;
       }
       stages = stages + stages / 2 + 1;
     }
   }
+  const Real before = kinetic_energy(particles);
   for (std::size_t k = 0; k < field.potentials().size(); ++k)
     if (field.acts(k) && !field.potentials()[k]->has_damping_modes())
       field.potentials()[k]->dissipate(particles.positions, particles.inverse_masses, damping_time, duration,
                                        particles.velocities);
-  damped.lost = kinetic - kinetic_energy(particles);
+  const Real after = kinetic_energy(particles);
+  damped.driving_work += std::max<Real>(after - before, 0);  // element by element nothing else gives any
+  damped.lost = kinetic + damped.driving_work - after;
   return damped;
 }
 

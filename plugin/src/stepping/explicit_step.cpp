@@ -236,10 +236,11 @@ class SubCycle {
     for (SteppedBody* body : island_.bodies) {
       if (!damps(*body)) continue;
       const Damper::Damped damped =
-          body->damper.damp(*body->field, body->options.damping_time, duration, has_driven_particles_, body->particles);
+          body->damper.damp(*body->field, body->options.damping_time, duration, body->particles);
       body->step_flows.damping += damped.lost;
+      body->step_flows.driving += damped.driving_work;
       body->report.damping_share = std::min(body->report.damping_share, damped.share);
-      if (has_driven_particles_) outside_work_ -= damped.lost;  // what drives them may give energy through the damping
+      outside_work_ += damped.driving_work;
     }
     for (Coupling* coupling : island_.couplings)
       if (damps(*coupling)) outside_work_ += dissipate(*coupling, island_, duration);

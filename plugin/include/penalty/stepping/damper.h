@@ -18,13 +18,14 @@ namespace penalty {
 class Damper {
  public:
   struct Damped {
-    Real lost = 0;   // kinetic energy [J]
-    Real share = 1;  // of D that the most stages allowed; 0 where it had grown too stiff for all that were tried
+    Real lost = 0;          // energy [J]
+    Real driving_work = 0;  // of whoever moves what is held, through the damping [J]
+    Real share = 1;         // of D that the most stages allowed; 0 where it had grown too stiff for all that were tried
   };
 
-  /// `damping_time` as in Potential::add_damping [s]. Pinned particles keep their velocity; `are_driven`: some of them
-  /// have one. Without allocation but where elements, phases or times have changed.
-  Damped damp(const PotentialField& field, Real damping_time, Real duration, bool are_driven, Particles& particles);
+  /// `damping_time` as in Potential::add_damping [s]. Pinned particles keep their velocity. Without allocation but where
+  /// elements, phases or times have changed.
+  Damped damp(const PotentialField& field, Real damping_time, Real duration, Particles& particles);
 
   /// The next `damp` measures anew how much stiffer than at rest the damping has become.
   void begin_step() { growth_ = 0; }
@@ -39,6 +40,7 @@ class Damper {
                  DampingModes& modes) const;
   Real row_bound(const Particles& particles);
   void run_stages(int stages, Real share, const Particles& particles);
+  Real work_of_what_is_held(const Particles& particles) const;
 
   bool is_prepared_ = false;
   std::uint64_t stiffness_version_ = 0;
