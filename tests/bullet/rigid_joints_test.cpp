@@ -218,6 +218,32 @@ TEST_P(RigidJoints, APairOnAPadFallsAsleepTogetherAndStays) {
   EXPECT_TRUE(a.isActive() && b.isActive());
 }
 
+// Three that say the same, and an anchor that leaves the node some of its way: what they gave against each other, and went
+// on giving when the block had turned a little, sent it off at 1e14 m/s.
+TEST_P(RigidJoints, SlidersOnTheSameLineLetABlockBePulledAlongIt) {
+  for (const Real influence : {0.1, 0.3, 0.5, 0.9, 1.0}) {
+    Simulation own(GetParam());
+    own.set_gravity({0, -g, 0});
+    btRigidBody& block = own.add_box({0.3, 0.5, 0.2}, 10, {0.2, 2, 0.1});
+    block.setActivationState(DISABLE_DEACTIVATION);
+    std::vector<std::unique_ptr<btSliderConstraint>> sliders;
+    for (int k = 0; k < 3; ++k) {
+      sliders.push_back(std::make_unique<btSliderConstraint>(block, at_point({0.5 * k - 0.25, 0.15 * k, 0}), true));
+      own.world().addConstraint(sliders.back().get(), true);
+    }
+    btSoftBody& cube = own.add_jelly(make_box({1, 1, 1}, {1, 1, 1}), {.body = {.mass = 1}});
+    cube.appendAnchor(5, &block, btVector3(0, btScalar(0.2), btScalar(0.1)), true, btScalar(influence));
+    for (int k = 0; k < 60; ++k) {
+      own.step(frame);
+      ASSERT_TRUE(own.penalty().report(cube).finite) << "influence " << influence << ", frame " << k;
+      EXPECT_LT((center(block) - Vector3(center(block).x(), 2, 0.1)).norm(), 1e-4) << influence;
+      EXPECT_LT(to_vector(block.getLinearVelocity()).norm(), std::sqrt(2 * g * 1)) << "more than its fall could give";
+      EXPECT_LT(to_vector(block.getAngularVelocity()).norm(), 1e-2) << influence;
+    }
+    for (const auto& slider : sliders) own.world().removeConstraint(slider.get());
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(BothWorlds, RigidJoints, both_worlds(), param_name);
 
 }  // namespace

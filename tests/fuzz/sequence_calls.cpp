@@ -180,7 +180,9 @@ void Sequence::add_rigid_joint() {
   at_one.setOrigin(vector(chance_.uniform(-1, 1), chance_.uniform(-1, 1), 0));
   at_other.setOrigin(vector(0, chance_.uniform(-1, 1), chance_.uniform(-1, 1)));
   std::unique_ptr<btTypedConstraint> constraint;
-  switch (chance_.index(4)) {
+  const int kind = chance_.index(4);
+  say("  kind " + std::to_string(kind) + (to_world ? ", with the world" : ""));
+  switch (kind) {
     case 0:
       constraint = to_world ? std::make_unique<btPoint2PointConstraint>(*one.body, at_one.getOrigin())
                             : std::make_unique<btPoint2PointConstraint>(*one.body, *other.body, at_one.getOrigin(),

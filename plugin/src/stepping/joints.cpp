@@ -12,6 +12,7 @@ namespace {
 
 constexpr Real most_work = 1e6, usual_rows = 6;  // multiplications that a matrix is worth; of a joint
 constexpr Real least_pivot = 1e-10;              // share of the mobility
+constexpr Real redundant = 1e-4;                 // share of the mobility that other rows leave to one
 constexpr Real row_compliance = 1e-9;     // of two-sided rows, relative to the mobility: there may be more than needed
 constexpr Real held_share = 1e-7;         // share of the mobility below which the two-sided rows hold a limited one
 constexpr Real largest_turn = 0.02;       // in a substep [rad]
@@ -135,7 +136,8 @@ void Joints::begin(Real h, Real since, bool drifts) {
   start(since);
 }
 
-// As many rows as in the last substep are the same rows.
+// As many rows as in the last substep are the same rows. What rows that say the same as others give against each other may
+// be large, and would be no nothing any more where bodies have turned: these are met anew.
 void Joints::start(Real since) {
   std::size_t row = 0;
   for (std::size_t k = 0; k < island_.joints.size(); ++k) {
@@ -144,8 +146,10 @@ void Joints::start(Real since) {
     while (end < rows_.size() && rows_[end].joint == static_cast<int>(k)) ++end;
     const int count = end > row ? rows_[end - 1].number + 1 : 0;
     const bool is_same = count == joint.num_rows;
+    const bool is_redundant = places_[k].block >= 0 && blocks_[places_[k].block].is_redundant;
     for (; row < end; ++row) {
-      const Real known = is_same ? since * joint.forces[rows_[row].number] : 0;
+      const bool is_known = is_same && !(rows_[row].is_two_sided() && is_redundant);
+      const Real known = is_known ? since * joint.forces[rows_[row].number] : 0;
       push(rows_[row], std::clamp(known, rows_[row].least, rows_[row].most));
     }
     if (!is_same) left_[k].fill(nothing_known);
@@ -269,7 +273,7 @@ void Joints::factor(Block& block) {
     for (std::size_t j = first; j < i; ++j) at(j) = coupling(row, rows_[rows[j]]);
     at(i) = (1 + row_compliance) * row.mobility + row.softness;
   }
-  block.matrix.factor(least_pivot);
+  block.is_redundant = block.matrix.factor(least_pivot) < redundant;
 }
 
 // What the two-sided rows give when this one gives a unit impulse.

@@ -56,6 +56,7 @@ class Joints {
     int joints = 1;                                         // that hang together, these and others
     std::vector<std::size_t> two_sided = {}, limited = {};  // rows
     SkylineMatrix matrix = {};
+    bool is_redundant = false;  // some two-sided rows say what others do, or nearly
     Eigen::VectorXd asked = {}, impulses = {};
     std::vector<Real> answers = {};
   };

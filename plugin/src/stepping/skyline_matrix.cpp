@@ -15,7 +15,8 @@ void SkylineMatrix::add_row(Eigen::Index first) {
   entries_.resize(entries_.size() + static_cast<std::size_t>(size() - first), 0);
 }
 
-void SkylineMatrix::factor(Real least) {
+Real SkylineMatrix::factor(Real least) {
+  Real smallest = 1;
   for (Eigen::Index i = 0; i < size(); ++i) {
     const Eigen::Index first = rows_[i].first;
     const Real diagonal = at(i, i);
@@ -23,8 +24,11 @@ void SkylineMatrix::factor(Real least) {
       const Eigen::Index from = std::max(first, rows_[j].first);
       at(i, j) = (at(i, j) - part(i, from, j).dot(part(j, from, j))) / at(j, j);
     }
-    at(i, i) = std::sqrt(std::max(diagonal - part(i, first, i).squaredNorm(), least * diagonal));
+    const Real left = std::max(diagonal - part(i, first, i).squaredNorm(), least * diagonal);
+    smallest = std::min(smallest, left / diagonal);
+    at(i, i) = std::sqrt(left);
   }
+  return smallest;
 }
 
 void SkylineMatrix::solve(Eigen::Ref<Eigen::VectorXd> x) const {

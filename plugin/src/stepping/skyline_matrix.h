@@ -24,7 +24,8 @@ class SkylineMatrix {
   Real& at(Eigen::Index row, Eigen::Index column) { return entries_[rows_[row].begin + column - rows_[row].first]; }
 
   /// Makes L of A = L Lᵀ. What round-off leaves of a row that is a sum of others is taken for `least` of its diagonal.
-  void factor(Real least);
+  /// Returns the smallest share of a diagonal that the rows before leave.
+  Real factor(Real least);
 
   /// Makes A⁻¹ x of x. After `factor`.
   void solve(Eigen::Ref<Eigen::VectorXd> x) const;
