@@ -68,14 +68,15 @@ Real SurfacePair::relative_speed(const Couple& c) const {
   return a.speed + b.speed + (&a == &b ? 0 : (a.mean_velocity - b.mean_velocity).norm());
 }
 
-Real SurfacePair::used_since(const Couple& c, Real path, const Vector3& shift) const {
-  return path_of(c) - path + (shift_of(c) - shift).norm();
+// What a distance may have changed by.
+Real SurfacePair::used_since(const Couple& c, const Account& then) const {
+  const Account now = account_of(c);
+  return now.path - then.path + (now.shift - then.shift).norm();
 }
 
 void SurfacePair::see_motion(Couple& c) const {
-  c.moved += used_since(c, c.path_seen, c.shift_seen);
-  c.path_seen = path_of(c);
-  c.shift_seen = shift_of(c);
+  c.moved += used_since(c, c.seen);
+  c.seen = account_of(c);
 }
 
 // Of any two patches: twice the largest of one against all of them.
@@ -250,8 +251,7 @@ bool SurfacePair::refresh(Real h, Real remaining) {
   for (Couple& c : couples_) {
     see_motion(c);
     c.motion = h * relative_speed(c);
-    c.used = c.is_refreshed ? used_since(c, c.path, c.shift) : 0;
-    if (!c.is_refreshed || c.used + refresh_ahead * c.motion > c.room) {
+    if (!c.is_refreshed || used_since(c, c.refreshed) + refresh_ahead * c.motion > c.room) {
       refresh(c, refresh_ahead * c.motion, refresh_ahead * c.motion * (remaining / h));
       changed = true;
     }
@@ -263,7 +263,7 @@ bool SurfacePair::refresh(Real h, Real remaining) {
 void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
   c.room = std::max(least_room * thickness_, room_ahead * need);
   const Real want = kept_distance() + c.room;
-  Real used = c.is_searched ? used_since(c, c.searched_path, c.searched_shift) : 0;
+  Real used = c.is_searched ? used_since(c, c.searched) : 0;
   if (!c.is_searched || used + want > c.reach) {
     search(c, want, ahead);
     used = 0;
@@ -287,9 +287,7 @@ void SurfacePair::refresh(Couple& c, Real need, Real ahead) {
       if (old.points == q.points && old.are_edges == q.are_edges && old.from_b == q.from_b)
         std::tie(c.near.back().memory, c.near.back().record) = std::tie(old.memory, old.record);
   }
-  c.path = path_of(c);
-  c.shift = shift_of(c);
-  c.used = 0;
+  c.refreshed = account_of(c);
   c.is_refreshed = true;
 }
 
@@ -308,8 +306,7 @@ void SurfacePair::search(Couple& c, Real want, Real ahead) {
                      [](const FeaturePair& l, const FeaturePair& r) { return l.at_search < r.at_search; });
   }
   c.is_searched = true;
-  c.searched_path = path_of(c);
-  c.searched_shift = shift_of(c);
+  c.searched = account_of(c);
 }
 
 // Points of one patch at triangles of the other.

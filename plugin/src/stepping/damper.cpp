@@ -10,7 +10,8 @@ namespace {
 
 constexpr int most_stages = 200;
 constexpr int most_tries = 5;
-constexpr Real near_rest = 1.02;  // growth of the bound that is none;
+constexpr Real energy_round_off = 1e-12;  // relative
+constexpr Real near_rest = 1.02;          // growth of the bound that is none;
 constexpr Real safety_at_rest = 1.05,
                safety = 1.35;  // factors of the largest eigenvalue then, and else besides the growth
 constexpr Real damping_parameter = 1.3169578969248166;  // d = arcosh 2
@@ -74,8 +75,9 @@ void Damper::prepare(const PotentialField& field, Real damping_time, const Parti
   is_prepared_ = true;
 }
 
-// Leaves in `now_` what the velocities become, and in `change_` the changes, of what is held the impulse on it. The recurrence is that of what has been changed so far: round-off in the
-// velocities themselves would grow with the square of the stages.
+// Leaves in `now_` what the velocities become, and in `change_` the changes, of what is held the impulse on it. The
+// recurrence is that of what has been changed so far: round-off in the velocities themselves would grow with the square of
+// the stages.
 void Damper::run_stages(int stages, Real share, const Particles& particles) {
   const Real d = damping_parameter / stages;
   const Real w0 = std::cosh(d), w1 = share * std::sinh(d) / (stages * std::tanh(damping_parameter));
@@ -116,6 +118,7 @@ Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real
   const Real kinetic = kinetic_energy(particles);
   if (particles.velocities.isZero(0) || !std::isfinite(kinetic)) return {};
   Damped damped;
+  Real left = kinetic;
   prepare(field, damping_time, particles);
   if (rest_bound_ > 0) {
     add_modes(field, particles.positions, damping_time, duration, modes_);
@@ -127,23 +130,29 @@ Damper::Damped Damper::damp(const PotentialField& field, Real damping_time, Real
     damped.share = 0;
     for (int tries = 0; tries < most_tries && damped.share == 0; ++tries) {
       run_stages(stages, share, particles);
-      const Real work = work_of_what_is_held(particles);
-      if (kinetic_energy(now_, particles.inverse_masses) <= kinetic + work + 1e-12 * (kinetic + std::abs(work))) {
+      const Real work = work_of_what_is_held(particles), now = kinetic_energy(now_, particles.inverse_masses);
+      if (now <= kinetic + work + energy_round_off * (kinetic + std::abs(work))) {
         particles.velocities = now_;  // not swapped: contacts point into it
+        left = now;
         damped.share = share;
         damped.driving_work = work;
       }
       stages = stages + stages / 2 + 1;
     }
   }
-  const Real before = kinetic_energy(particles);
+  bool dissipates = false;  // element by element, where nothing but what is held can give energy
   for (std::size_t k = 0; k < field.potentials().size(); ++k)
-    if (field.acts(k) && !field.potentials()[k]->has_damping_modes())
+    if (field.acts(k) && !field.potentials()[k]->has_damping_modes()) {
       field.potentials()[k]->dissipate(particles.positions, particles.inverse_masses, damping_time, duration,
                                        particles.velocities);
-  const Real after = kinetic_energy(particles);
-  damped.driving_work += std::max<Real>(after - before, 0);  // element by element nothing else gives any
-  damped.lost = kinetic + damped.driving_work - after;
+      dissipates = true;
+    }
+  if (dissipates) {
+    const Real now = kinetic_energy(particles);
+    damped.driving_work += std::max<Real>(now - left, 0);
+    left = now;
+  }
+  damped.lost = kinetic + damped.driving_work - left;
   return damped;
 }
 

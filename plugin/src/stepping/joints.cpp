@@ -12,7 +12,7 @@ namespace {
 
 constexpr Real most_work = 1e6, usual_rows = 6;  // multiplications that a matrix is worth; of a joint
 constexpr Real least_pivot = 1e-10;              // share of the mobility
-constexpr Real redundant = 1e-4;                 // share of the mobility that other rows leave to one
+constexpr Real redundant = 1e-4;                 // share of the mobility that others leave to a row that says the same
 constexpr Real row_compliance = 1e-9;     // of two-sided rows, relative to the mobility: there may be more than needed
 constexpr Real held_share = 1e-7;         // share of the mobility below which the two-sided rows hold a limited one
 constexpr Real largest_turn = 0.02;       // in a substep [rad]
@@ -136,8 +136,8 @@ void Joints::begin(Real h, Real since, bool drifts) {
   start(since);
 }
 
-// As many rows as in the last substep are the same rows. What rows that say the same as others give against each other may
-// be large, and would be no nothing any more where bodies have turned: these are met anew.
+// As many rows as in the last substep are the same rows. What redundant rows give against each other may be large and
+// cancels only while the bodies have not turned: these begin from nothing.
 void Joints::start(Real since) {
   std::size_t row = 0;
   for (std::size_t k = 0; k < island_.joints.size(); ++k) {

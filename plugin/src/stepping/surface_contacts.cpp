@@ -159,8 +159,7 @@ void SurfaceContacts::collect(Real h) {
     contact.pair->visit_near([&](FeaturePair& q, Real reach) {
       const ClosestPoints closest = contact.pair->find_closest(q);
       if (q.are_edges && !closest.is_interior && !q.is_lone) return;  // points and triangles are as near
-      const Real limit = q.thickness + reach;
-      if (closest.difference.squaredNorm() <= limit * limit) add(contact, q, closest, nullptr, &q.memory, &q.record);
+      if (q.distance <= q.thickness + reach) add(contact, q, closest, nullptr, &q.memory, &q.record);
     });
     const bool is_held = std::find(held_inside_.begin(), held_inside_.end(), contact.pair) != held_inside_.end();
     if (!contact.pair->enclosed().empty() && !is_held) lead_out(contact);

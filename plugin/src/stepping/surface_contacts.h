@@ -83,8 +83,8 @@ struct SurfaceScratch {
 /// Each pair of features that may touch in a drift of h is a one-sided constraint on velocities along the direction n
 /// between its closest points as they are at this instant: of the distance D and the thickness d that is kept, the
 /// relative normal speed u is asked to be u >= -(D - d)/h while there is a gap, and u >= 0 when there is none; thickness
-/// that was lost comes back at (d - D) / 0.05 s, at 2 cm/s and 100 m/s² at most. The impulse goes to both features by weight and inverse
-/// mass. There is no stiffness, no sign and no memory of sides: the two sides of a cloth are the same.
+/// that was lost comes back at (d - D) / 0.05 s, at 2 cm/s and 100 m/s² at most. The impulse goes to both features by weight
+/// and inverse mass. There is no stiffness, no sign and no memory of sides: the two sides of a cloth are the same.
 ///
 /// Friction acts at two points that are a thickness apart, so it would turn the particles of the pair: the part of
 /// the slip that is a rotation of these is left out, and so is the rotation that the impulse would give. Both momenta are
@@ -92,10 +92,10 @@ struct SurfaceScratch {
 /// impulses at the point of the soft one, so there is nothing to leave out.
 ///
 /// Contacts start from what they gave in the last substep: from the share of it that takes most of the approach away, so
-/// that a start is never worse than none. Sweeps go on until they change nothing that matters, contacts with rigid bodies in each of them and once more at
-/// the end. Then the guard lets no pair drift unless a plane separates it before and after: linear motions separated at
-/// both ends are separated throughout. What fails is swept again; what fails still moves on as one rigid body, which
-/// keeps both momenta where nothing is held.
+/// that a start is never worse than none. Sweeps go on until they change nothing that matters, contacts with rigid bodies in
+/// each of them and once more at the end. Then the guard lets no pair drift unless a plane separates it before and after:
+/// linear motions separated at both ends are separated throughout. What fails is swept again; what fails still moves on as
+/// one rigid body, which keeps both momenta where nothing is held.
 ///
 /// What starts out pierced is left to pass; points inside a closed surface are led out of it, all in one direction,
 /// at 0.2 m/s and 20 m/s² at most, unless it is a rigid body so deep that the particles in it hold it.

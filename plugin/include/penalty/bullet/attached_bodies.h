@@ -103,8 +103,8 @@ class AttachedBodies {
   AttachedBody attach(btSoftBody& body, PotentialField field, const AttachOptions& options = {});
 
   /// Gives the body back to Bullet, whose links know of nothing that broke, with all its faces, and lets those that it is
-  /// coupled to wake in the next step. Detaching a body that is not attached does nothing. A deleted body need not be detached; its memory here is given back when another body
-  /// stands at its address, or with the solver.
+  /// coupled to wake in the next step. Detaching a body that is not attached does nothing. A deleted body need not be
+  /// detached; its memory here is given back when another body stands at its address, or with the solver.
   void detach(const btSoftBody& body);
 
   bool is_attached(const btSoftBody& body) const;

@@ -101,18 +101,21 @@ class SurfacePair {
 
   static constexpr Real motion_reserve = 1.2;
 
+  /// How far patches have moved: see SurfacePatch.
+  struct Account {
+    Real path = 0;
+    Vector3 shift = Vector3::Zero();
+  };
+
   /// Two patches, or one and itself.
   struct Couple {
     int a = 0, b = 0;
     bool is_refreshed = false, is_searched = false;
-    Real room = 0;                     // near pairs: all that were nearer than thickness + room
-    Real reach = 0;                    // candidates: all that were nearer than that
-    Real path = 0, searched_path = 0;  // of both, when refreshed and searched
-    Vector3 shift = Vector3::Zero(), searched_shift = Vector3::Zero();  // of b against a
-    Real used = 0, motion = 0;  // what distances may have changed since the refresh, and can in this drift
-    Real moved = 0;             // what they can have changed by since it was found, by sums of all motions:
-    Real path_seen = 0;         // of those until here
-    Vector3 shift_seen = Vector3::Zero();
+    Real room = 0;                              // near pairs: all that were nearer than thickness + room
+    Real reach = 0;                             // candidates: all that were nearer than that
+    Account refreshed, searched, seen;          // of both, b against a, when that was done last
+    Real motion = 0;                            // what distances can change by in this drift,
+    Real moved = 0;                             // and by all that was seen so far, each drift by itself
     std::vector<FeaturePair> candidates, near;  // candidates by distance
   };
 
@@ -121,12 +124,6 @@ class SurfacePair {
 
   const SurfacePatch& patch_a(const Couple& c) const { return a_->patches()[c.a]; }
   const SurfacePatch& patch_b(const Couple& c) const { return b_->patches()[c.b]; }
-  /// Where the account of a patch stood when couples were found.
-  struct Account {
-    Real path;
-    Vector3 shift;
-  };
-
   template <class Visit>
   void visit_patches(const Visit& visit) const {
     for (const SurfacePatch& patch : a_->patches()) visit(patch);
@@ -137,10 +134,11 @@ class SurfacePair {
   Real used_by_patches() const;
   void find_couples(Real within, Real ahead);
   Real relative_speed(const Couple& c) const;
-  Real path_of(const Couple& c) const { return patch_a(c).path + patch_b(c).path; }
-  Vector3 shift_of(const Couple& c) const { return patch_b(c).shift - patch_a(c).shift; }
+  Account account_of(const Couple& c) const {
+    return {patch_a(c).path + patch_b(c).path, patch_b(c).shift - patch_a(c).shift};
+  }
   void see_motion(Couple& c) const;
-  Real used_since(const Couple& c, Real path, const Vector3& shift) const;
+  Real used_since(const Couple& c, const Account& then) const;
   void forget();
   void untangle();
   bool pierces(const ContactSurface& edges, int edge, const ContactSurface& triangles, int triangle) const;
@@ -159,7 +157,7 @@ class SurfacePair {
   ContactSurface* b_;
   Real thickness_ = 0, edge_ = 0;
   std::vector<Couple> couples_;  // by their patches
-  std::vector<Account> found_;   // of all patches; empty: couples are still to be found
+  std::vector<Account> found_;   // of all patches when couples were found; empty: couples are still to be found
   Real found_within_ = 0;        // patches of no couple were further apart then [m]
   BoxTree patch_tree_;           // of b
   std::uint64_t epoch_a_ = 0, epoch_b_ = 0;
