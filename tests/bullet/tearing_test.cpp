@@ -99,6 +99,11 @@ TEST_P(Tearing, RaysPassFacesOfBrokenSpringsUntilTheseAreMended) {
   for (const Break& b : std::vector<Break>(springs.breaks())) springs.set_enabled(b.element, true);
   sim.step(frame);
   EXPECT_EQ(expect_hits_but_at({}), 0);
+
+  tear(sim, body, sheet, 0.2);
+  sim.step(frame, 2);
+  sim.penalty().detach(body);
+  EXPECT_EQ(expect_hits_but_at({}), 0) << "at once";
 }
 
 TEST_P(Tearing, WhatASheetHoldsFallsThroughTheHole) {
@@ -162,6 +167,7 @@ TEST_P(Tearing, TheFacesBehindBrokenTetrahedraCloseTheBody) {
 }
 
 TEST_P(Tearing, FacesLookOutOfWhatIsLeftAndAreGivenBack) {
+  constexpr Real hardly_moved = 1e-3;  // in three frames, soft as it is [m³]; a cell has 1/64
   const TetMesh box = make_box({1, 1, 1}, {4, 4, 4});
   btSoftBody& body = sim.add(make_soft_body(sim.info(), box, {.mass = 10}));
   const int skin = body.m_faces.size();
@@ -183,12 +189,12 @@ TEST_P(Tearing, FacesLookOutOfWhatIsLeftAndAreGivenBack) {
     sim.step(frame);
     const auto [area, volume] = enclosed_by_faces(body);
     EXPECT_LT(area.norm(), limit(1e-12, 1e-6));
-    EXPECT_NEAR(volume, std::pow(stretch, 3) / 2, 1e-3) << (above ? "below" : "above");
+    EXPECT_NEAR(volume, std::pow(stretch, 3) / 2, hardly_moved) << (above ? "below" : "above");
     EXPECT_GT(body.m_faces.size(), skin);
   }
   sim.penalty().detach(body);
   EXPECT_EQ(body.m_faces.size(), skin);
-  EXPECT_NEAR(enclosed_by_faces(body).second, std::pow(stretch, 3), 1e-3);
+  EXPECT_NEAR(enclosed_by_faces(body).second, std::pow(stretch, 3), hardly_moved);
   EXPECT_NEAR(2 * hit(body, {0.3, 2, 0.33}, {0.3, 0, 0.33}), 2 - stretch, 0.02);
 }
 
