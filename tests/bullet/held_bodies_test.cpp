@@ -1,6 +1,5 @@
 // A step never throws: a body that cannot be stepped stays where it is, says why, and goes on when that is mended. All
 // else goes on as if it were not there.
-#include <limits>
 #include <stdexcept>
 
 #include "bullet/simulation.h"
@@ -8,15 +7,6 @@
 
 namespace penalty::testing {
 namespace {
-
-constexpr btScalar inf = std::numeric_limits<btScalar>::infinity();
-
-std::vector<Vector3> places_of(const btSoftBody& body) {
-  std::vector<Vector3> places;
-  places.reserve(body.m_nodes.size());
-  for (int i = 0; i < body.m_nodes.size(); ++i) places.push_back(to_vector(body.m_nodes[i].m_x));
-  return places;
-}
 
 Real fastest(const btSoftBody& body) {
   Real speed = 0;
@@ -224,63 +214,6 @@ TEST_P(Held, RigidBodiesFallOn) {
   EXPECT_NEAR(Real(boxes[0]->getWorldTransform().getOrigin().y()), y + v * t - 9.81 * t * t / 2, 0.02);
 }
 
-// Time steps that are none.
-
-class NoStep : public WorldTest {
- protected:
-  void expect_no_step(btScalar duration, bool first) {
-    sim.set_gravity({0, -9.81, 0});
-    btSoftBody& body = sim.add_jelly(make_ball(0.25, 2), {.shift = {0, 2, 0}});
-    if (!first) sim.step(frame, 5);
-    body.m_nodes[3].m_v += btVector3(0, 0, btScalar(0.25));
-    const std::vector<Vector3> before = places_of(body);
-    sim.world().stepSimulation(duration, 0);
-    EXPECT_EQ(places_of(body), before);
-    EXPECT_NEAR(Real(body.m_nodes[3].m_v.z()), 0.25, 1e-4) << "what the application wrote stays";
-    EXPECT_EQ(sim.penalty().report(body).problem, "the time step is not positive and finite: no step was made");
-    EXPECT_EQ(sim.penalty().report(body).finite, std::isfinite(duration));
-    const Real speed = Real(body.m_nodes[4].m_v.y());
-    sim.step(frame);
-    EXPECT_EQ(sim.penalty().report(body).problem, "");
-    EXPECT_TRUE(sim.penalty().report(body).finite);
-    const auto& particles = sim.penalty().particles(body);
-    EXPECT_TRUE(particles.positions.allFinite());
-    EXPECT_NEAR(linear_momentum(particles).y(), speed - 9.81 * frame, 1e-3) << "1 kg";
-    sim.step(frame, 30);
-    EXPECT_LT(lowest(body), 1.2) << "falls";
-    sim.remove(body);
-  }
-};
-
-TEST_P(NoStep, NegativeOnes) {
-  for (const bool first : {true, false}) expect_no_step(btScalar(-0.001), first);
-}
-TEST_P(NoStep, NotANumber) {
-  for (const bool first : {true, false}) expect_no_step(nan, first);
-}
-TEST_P(NoStep, InfiniteOnes) {
-  for (const bool first : {true, false}) expect_no_step(inf, first);
-  for (const bool first : {true, false}) expect_no_step(-inf, first);
-}
-
-// Steps so long that the positions leave what Bullet can write.
-TEST_P(NoStep, OnesThatLeadOutOfRange) {
-  btSoftBody& body = sim.add_jelly(make_ball(0.25, 1));
-  for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_v = btVector3(1000, 0, 0);
-  sim.step(frame);
-  sim.world().stepSimulation(btScalar(double_bullet ? 1e307 : 1e37), 0);
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < body.m_nodes.size(); ++i) {
-      ASSERT_TRUE(to_vector(body.m_nodes[i].m_x).allFinite());
-      ASSERT_TRUE(to_vector(body.m_nodes[i].m_v).allFinite());
-    }
-    EXPECT_TRUE(sim.penalty().particles(body).positions.allFinite());
-    sim.step(frame);
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(World, NoStep, both_worlds(), param_name);
-
 // Settings that are no numbers for some steps, on a body that falls: it waits, and falls on. Bullet would have switched
 // it off.
 class BadSetting : public Held {
@@ -334,30 +267,6 @@ TEST_P(BadSetting, Timescale) {
 }
 
 INSTANTIATE_TEST_SUITE_P(World, BadSetting, both_worlds(), param_name);
-
-TEST_P(NoStep, GravityThatIsNoNumberForOneStep) {
-  sim.add_ground();
-  btSoftBody& body = sim.add_jelly(make_ball(0.25, 2), {.shift = {0, 1, 0}});
-  let_sleep(body);
-  for (const btScalar bad : {nan, inf}) {
-    sim.set_gravity({0, -9.81, 0});
-    sim.step(frame, 5);
-    const std::vector<Vector3> before = places_of(body);
-    sim.info().m_gravity = btVector3(0, bad, 0);
-    sim.step(frame);
-    EXPECT_EQ(places_of(body), before);
-    EXPECT_EQ(sim.penalty().report(body).problem, "the gravity of its world info is not finite");
-    EXPECT_FALSE(sim.penalty().report(body).finite);
-  }
-  sim.set_gravity({0, -9.81, 0});
-  const Real before = lowest(body);
-  sim.step(frame, 4);
-  EXPECT_LT(lowest(body), before);
-  EXPECT_LT(sim.penalty().report(body).substeps, 1000);
-  sim.step(frame, 60);
-  EXPECT_GT(lowest(body), 0);
-  EXPECT_TRUE(body.isActive());
-}
 
 // Friction of what the body lies on.
 TEST_P(Held, FrictionOfAnObjectIsLeftOut) {

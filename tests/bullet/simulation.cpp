@@ -137,6 +137,13 @@ Vector3 center_of_mass(const Particles& particles) {
   return sum / mass;
 }
 
+std::vector<Vector3> places_of(const btSoftBody& body) {
+  std::vector<Vector3> places;
+  places.reserve(body.m_nodes.size());
+  for (int i = 0; i < body.m_nodes.size(); ++i) places.push_back(to_vector(body.m_nodes[i].m_x));
+  return places;
+}
+
 Real lowest(const btSoftBody& body) {
   Real y = Real(body.m_nodes[0].m_x.y());
   for (int i = 1; i < body.m_nodes.size(); ++i) y = std::min(y, Real(body.m_nodes[i].m_x.y()));

@@ -33,6 +33,7 @@ using Solver = demo::SoftSolver;
 
 inline constexpr bool double_bullet = sizeof(btScalar) == sizeof(double);
 inline constexpr btScalar nan = std::numeric_limits<btScalar>::quiet_NaN();
+inline constexpr btScalar inf = std::numeric_limits<btScalar>::infinity();
 inline constexpr Real frame = 1.0 / 60;        // [s]
 inline constexpr Real exact_frame = 1.0 / 64;  // sums of it are exact [s]
 inline constexpr Real g = 9.81;                // [m/s²]
@@ -111,6 +112,7 @@ inline std::string param_name(const ::testing::TestParamInfo<WorldKind>& info) {
 
 void let_sleep(btCollisionObject& object);
 Vector3 center_of_mass(const Particles& particles);
+std::vector<Vector3> places_of(const btSoftBody& body);                         // of the nodes [m]
 Real lowest(const btSoftBody& body);                                            // y of the lowest node [m]
 Real mean_volume_error(const AttachedBodies& penalty, const btSoftBody& body);  // mean |V/V0 - 1|
 TetMesh moved(TetMesh mesh, const Vector3& shift);
