@@ -1,23 +1,23 @@
 #!/usr/bin/env bash
 # Runs clang-tidy, with the checks and names of .clang-tidy, over every source of the tree and the headers that it includes.
 #
-#   tests/tidy.sh [--minutes N] [--jobs N] [--no-install] [PATH...]
+#   tests/tidy.sh [--minutes N | --seconds N] [--jobs N] [--no-install] [PATH...]
 #
 # With paths, only over the sources below them: `tests/tidy.sh plugin demos/main`. All of them take most of an hour on two
-# cores: with --minutes it begins with those that were changed last, and begins none after that time. The last line printed
+# cores: with --minutes or --seconds it begins with those that were changed last, and begins none after that time. The last line printed
 # is the verdict; the status is 0 if nothing was found, 1 if something was, 2 for arguments that make no sense.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 tidy=clang-tidy-19  # versions find different things; Debian 12 and 13 have this one both
 
 jobs=$(nproc)
-minutes=
+duration=
 install=yes
 paths=()
 while [ $# -gt 0 ]; do
   case $1 in
     --jobs) jobs=${2:-}; shift ;;
-    --minutes) minutes=${2:-x}; shift ;;
+    --minutes | --seconds) unit=$1 duration=${2:-x}; shift ;;
     --no-install) install=no ;;
     -h | --help) sed -n '2,8s/^# \{0,1\}//p' tests/tidy.sh; exit 0 ;;
     -*) echo "tests/tidy.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
@@ -25,7 +25,7 @@ while [ $# -gt 0 ]; do
   esac
   shift || true
 done
-[[ ${minutes:-1} =~ ^[1-9][0-9]*$ ]] || { echo "tests/tidy.sh: --minutes is '${minutes#x}', must be a positive number" >&2; exit 2; }
+[[ ${duration:-1} =~ ^[1-9][0-9]*$ ]] || { echo "tests/tidy.sh: $unit is '${duration#x}', must be a positive number" >&2; exit 2; }
 [[ $jobs =~ ^[1-9][0-9]*$ ]] || { echo "tests/tidy.sh: --jobs is '$jobs', must be a positive number" >&2; exit 2; }
 [ ${#paths[@]} -gt 0 ] || paths=(plugin demos tests)
 
@@ -41,8 +41,10 @@ mapfile -t sources < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' build/tidy/c
                        grep -E "^$PWD/($(IFS='|'; echo "${paths[*]}"))(/|\$)")
 [ ${#sources[@]} -gt 0 ] || { echo "tests/tidy.sh: no source is compiled below ${paths[*]}" >&2; exit 2; }
 total=${#sources[@]}
-deadline=$((minutes ? $(date +%s) + 60 * minutes : 1 << 40))
-if [ -n "$minutes" ]; then
+deadline=$((1 << 40))
+if [ -n "$duration" ]; then
+  [ "$unit" = --seconds ] || duration=$((60 * duration))
+  deadline=$(($(date +%s) + duration))
   mapfile -t sources < <({ git log --max-count=100 --format= --name-only 2>/dev/null | sed "s|^|$PWD/|" || true
                            printf '%s\n' "${sources[@]}"; } | awk '!seen[$0]++' |
                          grep -Fxf <(printf '%s\n' "${sources[@]}"))

@@ -5,11 +5,12 @@
 #
 #   tests/fuzz/run.sh [--minutes N | --seconds N] [--jobs N] [--seed N] [--only NAME]
 #
-# --minutes (default 10) or --seconds is the time for each of the readers and, for each of Bullet's builds, for the sequences;
-# in less than a minute not every allocation fails, but every seventh. As many as there are --jobs run at once; --only runs
-# one of vtk, gmsh, tetgen, ply, obj, stl, sequences, allocations. Sequences begin with --seed (default: the time, so that no
-# two runs are the same). Wants clang, and what tests/run.sh installs. What the fuzzers learned stays in build/fuzz/corpus
-# and is where the next run starts; inputs that were found out are kept in build/fuzz/found, and
+# --minutes (default 10) or --seconds is the time for each of the readers and, for each of Bullet's builds, for the sequences.
+# Less than a minute is for Bullet in single precision alone, and of the allocations every seventh fails. As many as there
+# are --jobs run at once; --only runs one of vtk, gmsh, tetgen, ply, obj, stl, sequences, allocations. Sequences begin with
+# --seed (default: the time, so that no two runs are the same). Wants clang, and what tests/run.sh installs. What the fuzzers
+# learned stays in build/fuzz/corpus and is where the next run starts; inputs that were found out are kept in
+# build/fuzz/found, and
 #
 #   build/fuzz/tests/fuzz/fuzz_FORMAT FILE
 #   build/fuzz/tests/fuzz/api_sequences_PRECISION --seed N --log
@@ -31,7 +32,7 @@ while [ $# -gt 0 ]; do
     --jobs) jobs=${2:-} ;;
     --seed) seed=${2:-} ;;
     --only) only=${2:-} ;;
-    -h | --help) sed -n '2,20s/^# \{0,1\}//p' tests/fuzz/run.sh; exit 0 ;;
+    -h | --help) sed -n '2,19s/^# \{0,1\}//p' tests/fuzz/run.sh; exit 0 ;;
     *) echo "tests/fuzz/run.sh: unknown argument '$1'; try --help" >&2; exit 2 ;;
   esac
   shift $(($# > 1 ? 2 : 1))
@@ -45,7 +46,9 @@ case " ${readers[*]} sequences allocations " in
   *) echo "tests/fuzz/run.sh: --only is '$only', must be one of ${readers[*]} sequences allocations" >&2; exit 2 ;;
 esac
 
-cmake --preset fuzz
+precisions=(float float64) stride=1
+[ "$duration" -ge 60 ] || precisions=(float) stride=7
+cmake --preset fuzz -D BULLET_PENALTY_PRECISIONS="$(IFS=';'; echo "${precisions[*]}")"
 cmake --build --preset fuzz --target fuzz_programs --parallel "$jobs"
 programs=build/fuzz/tests/fuzz
 mkdir -p build/fuzz/corpus build/fuzz/found
@@ -76,11 +79,11 @@ for reader in "${readers[@]}"; do
     -rss_limit_mb=$memory -malloc_limit_mb=1024 -detect_leaks=$leaks -print_final_stats=1 -print_funcs=0 -verbosity=0 \
     -artifact_prefix="build/fuzz/found/$reader-" "build/fuzz/corpus/$reader"
 done
-for program in "$programs"/api_sequences_*; do
-  try "sequences_${program##*_}" "$program" --seed "$seed" --count 1000000000 --seconds "$duration"
+for precision in "${precisions[@]}"; do
+  try "sequences_$precision" "$programs/api_sequences_$precision" --seed "$seed" --count 1000000000 --seconds "$duration"
 done
-for program in "$programs"/nth_allocation_*; do
-  try "allocations_${program##*_}" "$program" --stride $((duration < 60 ? 7 : 1))
+for precision in "${precisions[@]}"; do
+  try "allocations_$precision" "$programs/nth_allocation_$precision" --stride "$stride"
 done
 wait
 
