@@ -1,9 +1,11 @@
 #include "penalty/fields/batch.h"
 
 #include "penalty/fields/batch_loops.h"
+#include "row_kernels.h"
 
 namespace penalty {
 namespace detail {
+namespace {
 
 // GCC compiles one function twice and the loader picks: fused multiply-add and three-operand instructions are worth a
 // fifth of the time. Elsewhere there is only the plain one.
@@ -11,9 +13,51 @@ template <ElementKind Kind>
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
 [[gnu::target_clones("arch=x86-64-v3", "default")]]
 #endif
-Real add_own_element_forces(const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils,
-                            const Kind* kinds, const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
+Real add_forces_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
+                           std::size_t size, const Real* x, Real* f) {
   return add_element_forces(stencils, kinds, stiffnesses, size, x, f);
+}
+
+template <ElementKind Kind>
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+[[gnu::target_clones("arch=x86-64-v3", "default")]]
+#endif
+void add_forces_only_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
+                                std::size_t size, const Real* x, Real* f) {
+  add_element_forces_only(stencils, kinds, stiffnesses, size, x, f);
+}
+
+}  // namespace
+
+// Never inlined, so that they are here for batches that a program compiles itself.
+template <ElementKind Kind>
+[[gnu::noinline]] Real add_own_element_forces(
+    const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils, const Kind* kinds,
+    const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
+  if constexpr (has_rows<Kind>)
+    if (rows::are_supported()) {
+      const Real energy = rows::add_forces(stencils, kinds, stiffnesses, size, x, f);
+      if constexpr (HasEnergyGradient<Kind>)
+        return rows::energy(stencils, kinds, stiffnesses, size, x);
+      else
+        return energy;
+    }
+  return add_forces_one_by_one(stencils, kinds, stiffnesses, size, x, f);
+}
+
+template <ElementKind Kind>
+[[gnu::noinline]] void add_own_element_forces_only(
+    const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils, const Kind* kinds,
+    const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
+  if constexpr (has_rows<Kind>)
+    if (rows::are_supported()) {
+      rows::add_forces(stencils, kinds, stiffnesses, size, x, f);
+      return;
+    }
+  if constexpr (HasEnergyGradient<Kind>)
+    add_forces_only_one_by_one(stencils, kinds, stiffnesses, size, x, f);
+  else
+    add_forces_one_by_one(stencils, kinds, stiffnesses, size, x, f);
 }
 
 }  // namespace detail

@@ -115,6 +115,10 @@ Real PotentialField::add_forces(const Positions& x, Forces f) const {
   return sum;
 }
 
+void PotentialField::add_forces_only(const Positions& x, Forces f) const {
+  for_each_acting([&](const Potential& p) { p.add_forces_only(x, f); });
+}
+
 void PotentialField::add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const {
   const auto add = [&](const Potential& p) { p.add_stiffness(x, model, stiffness); };
   if (stiffness.is_counting())

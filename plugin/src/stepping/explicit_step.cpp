@@ -99,7 +99,7 @@ class SubCycle {
     int flowed = 0;  // substeps before the last flow
     Real kick_time = h / 2;
     for (int k = 1; k <= substeps; ++k) {
-      substep(kick_time, h);
+      substep(kick_time, h, k == substeps);
       kick_time = h;
       const auto ends_one_of = [&](int parts) { return k * parts / substeps > (k - 1) * parts / substeps; };
       const bool damps_now = damps_ && ends_one_of(dampings);
@@ -135,7 +135,8 @@ class SubCycle {
     call(anchors_);
   }
 
-  void substep(Real kick_time, Real h) {
+  // The energy is read after the last one only.
+  void substep(Real kick_time, Real h, bool is_last) {
     kick_others(kick_time);
     if (has_contacts_) {
       for (SteppedBody* body : island_.bodies) kick(*body, kick_time);
@@ -149,7 +150,7 @@ class SubCycle {
     surfaces_.drifted(h);
     remaining_ -= h;
     add_driving_work(h / 2);
-    for (SteppedBody* body : island_.bodies) evaluate_forces(*body);
+    for (SteppedBody* body : island_.bodies) is_last ? evaluate_forces(*body) : evaluate_forces_only(*body);
     for (Coupling* coupling : island_.couplings) evaluate_forces(*coupling, island_);
     add_driving_work(h / 2);
   }

@@ -21,14 +21,24 @@ int fastest(const Particles& particles) {
   return static_cast<int>(particle);
 }
 
-}  // namespace
-
-void evaluate_forces(SteppedBody& body) {
+void reset_forces(SteppedBody& body) {
   if (body.external_forces.size() == 0)
     body.forces.setZero(4, body.particles.size());
   else
     body.forces = body.external_forces;
+}
+
+}  // namespace
+
+void evaluate_forces(SteppedBody& body) {
+  reset_forces(body);
   body.elastic_energy = body.field->add_forces(body.particles.positions, body.forces);
+  body.forces_valid = true;
+}
+
+void evaluate_forces_only(SteppedBody& body) {
+  reset_forces(body);
+  body.field->add_forces_only(body.particles.positions, body.forces);
   body.forces_valid = true;
 }
 

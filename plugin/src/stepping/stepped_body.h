@@ -9,6 +9,9 @@ inline Real inverse_or_zero(Real value) { return value > 0 ? 1 / value : 0; }
 /// Energy and forces of the body where it is now.
 void evaluate_forces(SteppedBody& body);
 
+/// Forces alone: `elastic_energy` is then out of date.
+void evaluate_forces_only(SteppedBody& body);
+
 /// Half the work that an impulse on a particle shares with the kick of the body's own forces [J].
 Real kick_work(const SteppedBody& body, int particle, const Vector3& impulse, Real kick_time);
 

@@ -63,6 +63,7 @@ class Batch final : public ElementBatch {
 
   Real energy(const Positions& x) const override;
   Real add_forces(const Positions& x, Forces f) const override;
+  void add_forces_only(const Positions& x, Forces f) const override;
   void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const override;
   void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale, Forces df) const override;
   void add_bounds(const Positions& x, std::span<Real> bounds) const override;

@@ -9,10 +9,14 @@ namespace detail {
 template <class Kind>
 struct BatchLoops {};
 
-/// `add_element_forces`, compiled in the library for the processor that the program runs on; own kinds only.
+/// `add_element_forces` and `add_element_forces_only`, compiled in the library for the processor that the program runs
+/// on, four elements at a time where row_kernels.h has a loop for the kind; own kinds only.
 template <ElementKind Kind>
 Real add_own_element_forces(const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils,
                             const Kind* kinds, const Real* stiffnesses, std::size_t size, const Real* x, Real* f);
+template <ElementKind Kind>
+void add_own_element_forces_only(const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils,
+                                 const Kind* kinds, const Real* stiffnesses, std::size_t size, const Real* x, Real* f);
 }  // namespace detail
 
 template <ElementKind Kind>
@@ -42,6 +46,23 @@ Real Batch<Kind>::add_forces(const Positions& x, Forces f) const {
     scatter(e, s.gradient, -1, f);
   });
   return sum;
+}
+
+template <ElementKind Kind>
+void Batch<Kind>::add_forces_only(const Positions& x, Forces f) const {
+  if constexpr (num_points != dynamic) {
+    if (is_plain()) {
+      const Stencil* stencils = stencils_.data();
+      const Kind* kinds = kinds_.data();
+      const std::size_t size = stencils_.size();
+      if constexpr (is_own_kind<Kind>)
+        detail::add_own_element_forces_only(stencils, kinds, stiffnesses_.data(), size, x.data(), f.data());
+      else
+        add_element_forces_only(stencils, kinds, stiffnesses_.data(), size, x.data(), f.data());
+      return;
+    }
+  }
+  Batch::add_forces(x, f);
 }
 
 template <ElementKind Kind>

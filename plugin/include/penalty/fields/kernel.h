@@ -51,4 +51,22 @@ template <ElementKind Kind>
   return Constraint<Kind> ? sum / 2 : sum;
 }
 
+/// The same without the energy, of kinds whose energy costs extra.
+template <ElementKind Kind>
+[[gnu::always_inline]] inline void add_element_forces_only(
+    const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils, const Kind* kinds,
+    const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
+  if constexpr (HasEnergyGradient<Kind>) {
+    for (std::size_t e = 0; e < size; ++e) {
+      Points<Kind::num_points> points;
+      Gradient<Kind::num_points> gradient;
+      gather_points(stencils[e], x, points);
+      kinds[e].energy_gradient(points, gradient);
+      scatter_points(stencils[e], gradient, -stiffnesses[e], f);
+    }
+  } else {
+    add_element_forces(stencils, kinds, stiffnesses, size, x, f);
+  }
+}
+
 }  // namespace penalty

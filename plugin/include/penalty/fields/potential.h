@@ -42,7 +42,8 @@ class ElementVisitor {
 /// give results that are not finite, never an error. One thread at a time may use a potential: elements of many points
 /// keep scratch space.
 ///
-/// A potential of your own needs the first five; the others are for what damps, flows, breaks or is to be looked at.
+/// A potential of your own needs the five without a body; the others are for what damps, flows, breaks or is to be
+/// looked at.
 class Potential {
  public:
   explicit Potential(std::string name) : name_(std::move(name)) {}
@@ -50,8 +51,11 @@ class Potential {
 
   virtual Real energy(const Positions& x) const = 0;  // [J]
 
-  /// f += -dE/dx [N]; returns E [J], which costs next to nothing on the way.
+  /// f += -dE/dx [N]; returns E [J], which costs little on the way.
   virtual Real add_forces(const Positions& x, Forces f) const = 0;
+
+  /// The same where nobody asks for E: most substeps of a step.
+  virtual void add_forces_only(const Positions& x, Forces f) const { add_forces(x, f); }
 
   /// K += d²E/dx² [N/m].
   virtual void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const = 0;

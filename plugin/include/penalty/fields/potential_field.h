@@ -122,6 +122,7 @@ class PotentialField {
   std::size_t num_elements() const;
   Real energy(const Positions& x) const;
   Real add_forces(const Positions& x, Forces f) const;
+  void add_forces_only(const Positions& x, Forces f) const;
   void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const;
   void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale, Forces df) const;
   void add_bounds(const Positions& x, std::span<Real> bounds) const;

@@ -55,6 +55,11 @@ concept ElasticEnergy = requires(const Kind e, const Points<Kind::num_points>& p
   { e.energy_hessian(p) } -> std::convertible_to<Hessian<Kind::num_points>>;
 };
 
+/// An energy may give its gradient alone where psi costs extra: `energy_gradient` overwrites its second argument.
+template <class Kind>
+concept HasEnergyGradient = ElasticEnergy<Kind> && requires(const Kind e, const Points<Kind::num_points>& p,
+                                                            Gradient<Kind::num_points>& g) { e.energy_gradient(p, g); };
+
 /// What elements are made of: a constraint C with E = K/2 s(C)², or an energy of its own, E = K psi. For the latter C
 /// stands for sqrt(2 psi), so that profiles mean the same.
 template <class Kind>

@@ -62,26 +62,20 @@ struct StableNeoHookean {
 
   Real rest_volume() const { return 1 / (6 * inverse_rest.determinant()); }
 
-  Real energy(const Points<4>& p) const {
+  [[gnu::always_inline]] Real energy(const Points<4>& p) const {
     const State s(*this, p);
     return psi(s);
   }
 
   [[gnu::always_inline]] Real energy_and_gradient(const Points<4>& p, Gradient<4>& g) const {
     const State s(*this, p);
-    const Real stretch = shear * (1 - s.inverse), swell = bulk() * s.dilation - 1;  // l (J - alpha)
-    const Triple p0 = s.f[0] * stretch + s.cofactor[0] * swell;
-    const Triple p1 = s.f[1] * stretch + s.cofactor[1] * swell;
-    const Triple p2 = s.f[2] * stretch + s.cofactor[2] * swell;
-    const auto to_point = [&](int k) {
-      return p0 * inverse_rest(k, 0) + p1 * inverse_rest(k, 1) + p2 * inverse_rest(k, 2);
-    };
-    const Triple g1 = to_point(0), g2 = to_point(1), g3 = to_point(2);
-    (-(g1 + g2 + g3)).store(g, 0);
-    g1.store(g, 1);
-    g2.store(g, 2);
-    g3.store(g, 3);
+    gradient(s, g);
     return psi(s);
+  }
+
+  /// Without the logarithm, which only psi itself has.
+  [[gnu::always_inline]] void energy_gradient(const Points<4>& p, Gradient<4>& g) const {
+    gradient(State(*this, p), g);
   }
 
   /// d²psi/dp². Moving p_a by x changes F by x w_aᵀ, w_a row a of D0⁻¹ (w_0 minus their sum); with u_a = F w_a and
@@ -166,13 +160,13 @@ struct StableNeoHookean {
     visit(lambda_over_mu - 1, g);
   }
 
+  static constexpr Real shear = 4.0 / 3;                  // m
+  Real bulk() const { return lambda_over_mu + 5.0 / 6; }  // l
+
   Matrix3 inverse_rest;  // D0⁻¹ [1/m]; zero in a prototype
   Real lambda_over_mu;
 
  private:
-  static constexpr Real shear = 4.0 / 3;                  // m
-  Real bulk() const { return lambda_over_mu + 5.0 / 6; }  // l
-
   Triple row(int k) const { return {inverse_rest(k, 0), inverse_rest(k, 1), inverse_rest(k, 2)}; }
 
   // Columns of F and of dJ/dF, and the invariants.
@@ -193,6 +187,21 @@ struct StableNeoHookean {
       dilation = dot(f[0], cofactor[0]) - 1;
     }
   };
+
+  [[gnu::always_inline]] void gradient(const State& s, Gradient<4>& g) const {
+    const Real stretch = shear * (1 - s.inverse), swell = bulk() * s.dilation - 1;  // l (J - alpha)
+    const Triple p0 = s.f[0] * stretch + s.cofactor[0] * swell;
+    const Triple p1 = s.f[1] * stretch + s.cofactor[1] * swell;
+    const Triple p2 = s.f[2] * stretch + s.cofactor[2] * swell;
+    const auto to_point = [&](int k) {
+      return p0 * inverse_rest(k, 0) + p1 * inverse_rest(k, 1) + p2 * inverse_rest(k, 2);
+    };
+    const Triple g1 = to_point(0), g2 = to_point(1), g3 = to_point(2);
+    (-(g1 + g2 + g3)).store(g, 0);
+    g1.store(g, 1);
+    g2.store(g, 2);
+    g3.store(g, 3);
+  }
 
   // psi with H = F - 1, so that the terms that are large near rest cancel on paper and not in floating point: with
   // y = (I - 3)/4 it is |H|²/2 - (sum of the principal 2 x 2 minors of H) - det H + m/2 (y - ln(1 + y)) + l/2 (J - 1)².
