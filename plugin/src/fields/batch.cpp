@@ -27,6 +27,16 @@ void add_forces_only_one_by_one(const StencilOf<Kind>* stencils, const Kind* kin
   add_element_forces_only(stencils, kinds, stiffnesses, size, x, f);
 }
 
+template <ElementKind Kind>
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+[[gnu::target_clones("arch=x86-64-v3", "default")]]
+#endif
+void add_modes_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
+                          const Real* times, std::size_t size, const Real* x, Real time, Real duration,
+                          DampingModes& modes) {
+  add_element_modes(stencils, kinds, stiffnesses, times, size, x, time, duration, modes);
+}
+
 }  // namespace
 
 // Never inlined, so that they are here for batches that a program compiles itself.
@@ -58,6 +68,14 @@ template <ElementKind Kind>
     add_forces_only_one_by_one(stencils, kinds, stiffnesses, size, x, f);
   else
     add_forces_one_by_one(stencils, kinds, stiffnesses, size, x, f);
+}
+
+template <ElementKind Kind>
+[[gnu::noinline]] void add_own_element_modes(
+    const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils, const Kind* kinds,
+    const Real* stiffnesses, const Real* times, std::size_t size, const Real* x, Real time, Real duration,
+    DampingModes& modes) {
+  add_modes_one_by_one(stencils, kinds, stiffnesses, times, size, x, time, duration, modes);
 }
 
 }  // namespace detail

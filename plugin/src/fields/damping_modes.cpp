@@ -1,8 +1,9 @@
 #include "penalty/fields/damping_modes.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
+#include <numeric>
+
+#include "damping_rows.h"
 
 namespace penalty {
 namespace {
@@ -14,132 +15,96 @@ void increase(Real* p, const Triple& t) {
   p[2] += t.z;
 }
 
-// Four reals at once: a particle, or a gradient and its padding.
-using Quadruple = Real __attribute__((vector_size(32), aligned(8), may_alias));
-
-const Quadruple& quadruple(const Real* p) { return *reinterpret_cast<const Quadruple*>(p); }
-Quadruple& quadruple(Real* p) { return *reinterpret_cast<Quadruple*>(p); }
-
-// out += sum weight g (g . v) over modes of N particles, of which the last has minus the sum of the other gradients.
-template <int N>
-[[gnu::always_inline]] inline void add_products(const std::array<int, N>* stencils, const Real* weights,
-                                                const std::array<Real, 4 * (N - 1)>* gradients, std::size_t size,
-                                                const Real* v, Real* out) {
-  for (std::size_t k = 0; k < size; ++k) {
-    const std::array<int, N>& stencil = stencils[k];
-    const Real* g = gradients[k].data();
-    const std::size_t last = 4 * static_cast<std::size_t>(stencil[N - 1]);
-    const Quadruple of_last = quadruple(v + last);
-    Quadruple rates = quadruple(g) * (quadruple(v + 4 * static_cast<std::size_t>(stencil[0])) - of_last);
-    for (int i = 1; i < N - 1; ++i)
-      rates += quadruple(g + 4 * i) * (quadruple(v + 4 * static_cast<std::size_t>(stencil[i])) - of_last);
-    const Real rate = weights[k] * (rates[0] + rates[1] + rates[2]);
-    Quadruple sum{};
-    for (int i = 0; i < N - 1; ++i) {
-      const Quadruple impulse = quadruple(g + 4 * i) * rate;
-      quadruple(out + 4 * static_cast<std::size_t>(stencil[i])) += impulse;
-      sum += impulse;
-    }
-    quadruple(out + last) -= sum;
-  }
-}
-
-template <int N>
-void add_mode_bounds(const std::array<int, N>& stencil, Real weight, const std::array<Real, 4 * (N - 1)>& gradient,
-                     std::span<Real> bounds) {
-  std::array<Real, N> norms2;
-  Triple sum{0, 0, 0};
-  Real total = 0;
-  for (int i = 0; i < N; ++i) {
-    const Triple g = i < N - 1 ? load(gradient.data() + 4 * i) : -sum;
-    sum = sum + g;
-    norms2[i] = weight / 2 * dot(g, g);
-    total += norms2[i];
-  }
-  for (int i = 0; i < N; ++i) bounds[stencil[i]] += N * norms2[i] + total;
-}
-
 }  // namespace
 
 void DampingModes::count(std::span<const int> stencil, bool cancels) {
-  const auto count_in = [&](auto& modes) {
-    auto& own = modes.stencils.emplace_back();
-    std::copy(stencil.begin(), stencil.end(), own.begin());
-    places_.push_back({static_cast<int>(own.size()), static_cast<int>(modes.stencils.size()) - 1});
-  };
-  switch (cancels ? stencil.size() : 0) {
-    case 2:
-      return count_in(pairs_);
-    case 3:
-      return count_in(triples_);
-    case 4:
-      return count_in(quadruples_);
-    default:
-      places_.push_back({other, static_cast<int>(others_.begins.size()) - 1});
-      others_.particles.insert(others_.particles.end(), stencil.begin(), stencil.end());
-      others_.begins.push_back(others_.particles.size());
+  const int size = cancels && stencil.size() >= 2 && stencil.size() <= 4 ? static_cast<int>(stencil.size()) : other;
+  if (size == other) {
+    places_.push_back({other, static_cast<int>(others_.begins.size()) - 1});
+    others_.particles.insert(others_.particles.end(), stencil.begin(), stencil.end());
+    others_.begins.push_back(others_.particles.size());
+  } else if (size == 2) {
+    places_.push_back({2, static_cast<int>(pairs_.size())});
+    pairs_.push_back({std::min(stencil[0], stencil[1]), std::max(stencil[0], stencil[1])});
+  } else {
+    places_.push_back({size, static_cast<int>(particles_.size())});
+    particles_.insert(particles_.end(), stencil.begin(), stencil.end());
   }
 }
 
 void DampingModes::end_counting() {
   is_counting_ = false;
-  // The first of equal pairs stays, in its place among the first of others.
-  std::map<std::pair<int, int>, Place*> first;
-  std::vector<std::array<int, 2>> pairs;
-  for (Place& place : places_) {
-    if (place.size != 2) continue;
-    const auto& [i, j] = pairs_.stencils[place.index];
-    const auto [found, is_new] = first.try_emplace(std::minmax(i, j), &place);
-    if (is_new) {
-      place.index = static_cast<int>(pairs.size());
-      pairs.push_back({i, j});
-    } else {
-      if (found->second->size != shared) shared_pairs_.push_back(found->second->index);
-      found->second->size = shared;
-      place = *found->second;
-    }
+  const auto for_each_pair_of_few = [this](const auto& visit) {
+    for (const Place& place : places_)
+      for (int a = place.index; place.size > 2 && a < place.index + place.size; ++a)
+        for (int b = a + 1; b < place.index + place.size; ++b)
+          particles_[a] < particles_[b] ? visit(a, b) : visit(b, a);
+  };
+  std::vector<std::array<int, 2>> blocks = pairs_;
+  for_each_pair_of_few([&](int a, int b) { blocks.push_back({particles_[a], particles_[b]}); });
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+
+  blocks_.begins.assign(blocks.empty() ? 1 : blocks.back()[0] + 2, 0);
+  for (const auto& [i, j] : blocks) {
+    ++blocks_.begins[i + 1];
+    blocks_.columns.push_back(j);
   }
-  pairs_.stencils = std::move(pairs);
-  pairs_.resize();
-  triples_.resize();
-  quadruples_.resize();
+  std::partial_sum(blocks_.begins.begin(), blocks_.begins.end(), blocks_.begins.begin());
+  const auto block_of = [&](int i, int j) {
+    const auto row = blocks_.columns.begin();
+    return std::lower_bound(row + blocks_.begins[i], row + blocks_.begins[i + 1], j) - row;
+  };
+  for (Place& place : places_)
+    if (place.size == 2) place.index = static_cast<int>(block_of(pairs_[place.index][0], pairs_[place.index][1]));
+  pairs_ = {};
+  blocks_.values.resize(9 * blocks.size() + 1);
+  blocks_.along.resize(blocks.size());
+  blocks_.directions.resize(blocks.size());
+
+  std::vector<std::size_t>& begins = blocks_.product_begins;
+  begins.assign(blocks.size() + 2, 0);
+  for_each_pair_of_few([&](int a, int b) { ++begins[block_of(particles_[a], particles_[b]) + 2]; });
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  blocks_.products.resize(begins.back());
+  for_each_pair_of_few(
+      [&](int a, int b) { blocks_.products[begins[block_of(particles_[a], particles_[b]) + 1]++] = {a, b}; });
+  begins.pop_back();
+
+  gradients_.resize(particles_.size());
   others_.weights.resize(others_.begins.size() - 1);
   others_.gradients.resize(3 * others_.particles.size());
 }
 
 void DampingModes::begin() {
   next_ = 0;
-  for (const int k : shared_pairs_) pairs_.weights[k] = 0;
-}
-
-// Until the end the weight is that of a gradient of length 1.
-void DampingModes::add_shared(int index, Real weight, const Triple& g) {
-  pairs_.weights[index] += weight * dot(g, g);
-  pairs_.gradients[index] = {g.x, g.y, g.z, 0};
+  std::fill(blocks_.along.begin(), blocks_.along.end(), 0);
 }
 
 void DampingModes::end() {
-  for (const int k : shared_pairs_) {
-    const Triple g = load(pairs_.gradients[k].data());
-    if (const Real norm2 = dot(g, g); norm2 > 0) pairs_.weights[k] /= norm2;
-  }
-}
-
-// Compiled twice, as the loop over the forces is.
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
+  if (is_counting_) return;
+  const DampingSummands from{.along = blocks_.along.data(),
+                             .directions = blocks_.directions.data(),
+                             .begins = blocks_.product_begins.data(),
+                             .products = blocks_.products.data(),
+                             .gradients = gradients_.data()};
+#if defined(__x86_64__) && defined(__GNUC__)
+  if (rows::are_supported()) return rows::sum_blocks(from, blocks_.columns.size(), blocks_.values.data());
 #endif
-void DampingModes::add_products_of_few(const Real* v, Real* out) const {
-  add_products<2>(pairs_.stencils.data(), pairs_.weights.data(), pairs_.gradients.data(), pairs_.stencils.size(), v,
-                  out);
-  add_products<3>(triples_.stencils.data(), triples_.weights.data(), triples_.gradients.data(),
-                  triples_.stencils.size(), v, out);
-  add_products<4>(quadruples_.stencils.data(), quadruples_.weights.data(), quadruples_.gradients.data(),
-                  quadruples_.stencils.size(), v, out);
+  sum_blocks(from, blocks_.columns.size(), blocks_.values.data());
 }
 
 void DampingModes::add_product(const Vectors& v, Forces out) const {
-  add_products_of_few(v.data(), out.data());
+  const DampingBlocks blocks{.num_rows = blocks_.begins.size() - 1,
+                             .begins = blocks_.begins.data(),
+                             .columns = blocks_.columns.data(),
+                             .values = blocks_.values.data()};
+#if defined(__x86_64__) && defined(__GNUC__)
+  if (rows::are_supported())
+    rows::add_block_products(blocks, v.data(), out.data());
+  else
+#endif
+    add_block_products(blocks, v.data(), out.data());
   for (std::size_t k = 0; k < others_.weights.size(); ++k) {
     Real rate = 0;
     for (std::size_t i = others_.begins[k]; i < others_.begins[k + 1]; ++i)
@@ -151,24 +116,26 @@ void DampingModes::add_product(const Vectors& v, Forces out) const {
 }
 
 void DampingModes::add_bounds(std::span<Real> bounds) const {
-  const auto add = [&]<int N>(const Modes<N>& modes) {
-    for (std::size_t k = 0; k < modes.stencils.size(); ++k)
-      add_mode_bounds<N>(modes.stencils[k], modes.weights[k], modes.gradients[k], bounds);
-  };
-  add(pairs_);
-  add(triples_);
-  add(quadruples_);
-  for (std::size_t k = 0; k < others_.weights.size(); ++k) {
-    const auto norm2 = [&](std::size_t i) {
-      const Triple g = load(&others_.gradients[3 * i]);
-      return others_.weights[k] / 2 * dot(g, g);
-    };
-    const std::size_t begin = others_.begins[k], end = others_.begins[k + 1];
+  // Both gradients of a mode along a line are as long.
+  for (std::size_t i = 0; i + 1 < blocks_.begins.size(); ++i)
+    for (std::size_t k = blocks_.begins[i]; k < blocks_.begins[i + 1]; ++k) {
+      bounds[i] += 2 * blocks_.along[k];
+      bounds[blocks_.columns[k]] += 2 * blocks_.along[k];
+    }
+  const auto add = [&bounds](std::span<const int> particles, Real weight, const auto& gradient) {
     Real total = 0;
-    for (std::size_t i = begin; i < end; ++i) total += norm2(i);
-    for (std::size_t i = begin; i < end; ++i)
-      bounds[others_.particles[i]] += static_cast<Real>(end - begin) * norm2(i) + total;
-  }
+    for (std::size_t i = 0; i < particles.size(); ++i) total += weight / 2 * dot(gradient(i), gradient(i));
+    for (std::size_t i = 0; i < particles.size(); ++i)
+      bounds[particles[i]] +=
+          static_cast<Real>(particles.size()) * (weight / 2) * dot(gradient(i), gradient(i)) + total;
+  };
+  for (const Place& place : places_)
+    if (place.size > 2)
+      add(std::span(particles_).subspan(place.index, place.size), 1,
+          [&](std::size_t i) { return load(gradients_[place.index + i].data()); });
+  for (std::size_t k = 0; k < others_.weights.size(); ++k)
+    add(std::span(others_.particles).subspan(others_.begins[k], others_.begins[k + 1] - others_.begins[k]),
+        others_.weights[k], [&](std::size_t i) { return load(&others_.gradients[3 * (others_.begins[k] + i)]); });
 }
 
 }  // namespace penalty

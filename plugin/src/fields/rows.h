@@ -36,6 +36,7 @@ using RowInMemory = Real __attribute__((vector_size(32), aligned(8), may_alias))
 [[gnu::always_inline]] inline Row load(const Real* vectors, int i) {
   return load(vectors + 4 * static_cast<std::size_t>(i));
 }
+[[gnu::always_inline]] inline void store(Real* p, Row row) { *reinterpret_cast<RowInMemory*>(p) = row; }
 [[gnu::always_inline]] inline void add(Real* vectors, int i, Row row) {
   *reinterpret_cast<RowInMemory*>(vectors + 4 * static_cast<std::size_t>(i)) += row;
 }
@@ -45,6 +46,7 @@ using RowInMemory = Real __attribute__((vector_size(32), aligned(8), may_alias))
 
 [[gnu::always_inline]] inline Row yzx(Row a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
 
+[[gnu::always_inline]] inline Row zxy(Row a) { return __builtin_shufflevector(a, a, 2, 0, 1, 3); }
 
 /// b x c, of which the callers have `yzx` already.
 [[gnu::always_inline]] inline Row cross(Row b, Row turned_b, Row c, Row turned_c) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../math/quadruple.h"
 #include "penalty/stepping/stable_step.h"
+#include "rigid_state.h"
 
 namespace penalty {
 namespace {
@@ -26,6 +28,37 @@ int stages_to_reach(Real z) {
   int stages = std::max(static_cast<int>(std::sqrt(std::min<Real>(z, 2 * most_stages * most_stages) / 1.5)), 1);
   while (stages < most_stages && reach(stages) < z) ++stages;
   return std::min(stages, most_stages);
+}
+
+// change before <- a change + b change before - c M^-1 product, what will be the change; product <- 0; now <- the
+// velocity with that, less the rigid one: linear + angular x (position - that of the first).
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+[[gnu::target_clones("arch=x86-64-v3", "default")]]
+#endif
+void end_stage(const Particles& particles, const Vector3& linear, const Vector3& angular, Real a, Real b, Real c,
+               const Real* change, Real* change_before, Real* product, Real* now) {
+  const Real* v = particles.velocities.data();
+  const Real* x = particles.positions.data();
+  // angular x position, by the columns of its matrix.
+  const Quadruple from_x = {0, angular[2], -angular[1], 0}, from_y = {-angular[2], 0, angular[0], 0},
+                  from_z = {angular[1], -angular[0], 0, 0}, common = {linear[0], linear[1], linear[2], 0},
+                  first = quadruple(x);
+  for (const Real inverse_mass : particles.inverse_masses) {
+    const Quadruple arm = quadruple(x) - first;
+    Quadruple changed = quadruple(v) - (common + from_x * arm[0] + from_y * arm[1] + from_z * arm[2]);
+    const Real divisor = inverse_mass > 0 ? inverse_mass : 1;
+    quadruple(change_before) =
+        quadruple(change) * a + quadruple(change_before) * b - quadruple(product) * (c * divisor);
+    if (inverse_mass > 0) changed += quadruple(change_before);
+    quadruple(now) = changed;
+    quadruple(product) = Quadruple{};
+    change += 4;
+    change_before += 4;
+    product += 4;
+    now += 4;
+    v += 4;
+    x += 4;
+  }
 }
 
 }  // namespace
@@ -76,26 +109,32 @@ void Damper::prepare(const PotentialField& field, Real damping_time, const Parti
 }
 
 // Leaves in `now_` what the velocities become, and in `change_` the changes, of what is held the impulse on it. The
-// recurrence is that of what has been changed so far: round-off in the velocities themselves would grow with the square of
-// the stages.
+// recurrence is that of what has been changed so far: round-off in the velocities themselves would grow with the square
+// of the stages. Nothing damps the rigid motion, and D is multiplied with what is left without it: of fast spin it would
+// make impulses of the size of round-off that have a torque.
 void Damper::run_stages(int stages, Real share, const Particles& particles) {
   const Real d = damping_parameter / stages;
   const Real w0 = std::cosh(d), w1 = share * std::sinh(d) / (stages * std::tanh(damping_parameter));
-  now_ = particles.velocities;
+  Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();
+  const bool is_free = std::none_of(particles.inverse_masses.begin(), particles.inverse_masses.end(),
+                                    [](Real inverse_mass) { return inverse_mass == 0; });
+  if (is_free) {
+    const RigidState rigid(particles);
+    angular = rigid.angular_velocity(rigid.spin);
+    linear = rigid.momentum / rigid.mass + angular.cross(particles.positions.col(0).head<3>() - rigid.center);
+  }
   change_.setZero();
   change_before_.setZero();
   product_.setZero();
-  // change <- a change + b change before - c M^-1 D now
-  const auto stage = [&](Real a, Real b, Real c) {
-    modes_.add_product(now_, product_);
-    for (int i = 0; i < particles.size(); ++i) {
-      const Real inverse_mass = particles.inverse_masses[i], divisor = inverse_mass > 0 ? inverse_mass : 1;
-      change_before_.col(i) = a * change_.col(i) + b * change_before_.col(i) - (c * divisor) * product_.col(i);
-      if (inverse_mass > 0) now_.col(i) = particles.velocities.col(i) + change_before_.col(i);
-      product_.col(i).setZero();
-    }
+  const auto end = [&](Real a, Real b, Real c) {
+    end_stage(particles, linear, angular, a, b, c, change_.data(), change_before_.data(), product_.data(), now_.data());
     change_.swap(change_before_);
   };
+  const auto stage = [&](Real a, Real b, Real c) {
+    modes_.add_product(now_, product_);
+    end(a, b, c);
+  };
+  end(0, 0, 0);
   Real t_before = 1, t_now = w0;  // T_j(w0)
   stage(1, 0, w1 / w0);
   for (int j = 2; j <= stages; ++j) {
@@ -103,6 +142,9 @@ void Damper::run_stages(int stages, Real share, const Particles& particles) {
     stage(2 * w0 * t_now / t_next, -t_before / t_next, 2 * w1 * t_now / t_next);
     t_before = std::exchange(t_now, t_next);
   }
+  now_ = particles.velocities;
+  for (int i = 0; i < particles.size(); ++i)
+    if (particles.inverse_masses[i] > 0) now_.col(i) += change_.col(i);
 }
 
 // Of |R_s| <= 1 follows that the energy grows by no more than this, whatever the velocities of what is held: the part of

@@ -150,10 +150,6 @@ class Batch final : public ElementBatch {
   void visit_structured(std::size_t e, Scratch& s, StiffnessModel model, const VisitBlock& visit_block,
                         const VisitTerm& visit_term) const;
 
-  /// The modes that element e damps, with their weights in units of its damping.
-  template <class Visit>
-  void visit_damping_modes(std::size_t e, Scratch& s, const Visit& visit) const;
-
   std::vector<Stencil> stencils_;
   std::vector<Kind> kinds_;
   [[no_unique_address]] mutable std::conditional_t<num_points == dynamic, std::vector<Scratch>, Nothing> scratch_;

@@ -17,6 +17,10 @@ Real add_own_element_forces(const std::array<int, static_cast<std::size_t>(Kind:
 template <ElementKind Kind>
 void add_own_element_forces_only(const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils,
                                  const Kind* kinds, const Real* stiffnesses, std::size_t size, const Real* x, Real* f);
+template <ElementKind Kind>
+void add_own_element_modes(const std::array<int, static_cast<std::size_t>(Kind::num_points)>* stencils,
+                           const Kind* kinds, const Real* stiffnesses, const Real* times, std::size_t size,
+                           const Real* x, Real time, Real duration, DampingModes& modes);
 }  // namespace detail
 
 template <ElementKind Kind>

@@ -74,6 +74,8 @@ class ElementBatch : public Potential {
   Profile profile(std::size_t e) const { return profiles_.empty() ? Profile{} : profiles_[e]; }
   Real damping_time(std::size_t e, Real time) const { return damping_times_.empty() ? time : time + damping_times_[e]; }
 
+  const Real* damping_times() const { return damping_times_.empty() ? nullptr : damping_times_.data(); }  // [s]
+
   /// Plastic flow and breaking of one element at deviation c; returns the energy that it lost [J].
   Real evolve_element(std::size_t e, Real c, Real duration);
 

@@ -129,7 +129,7 @@ struct StableNeoHookean {
   /// lambda exceeds mu, the relative volume, weight lambda/mu - 1. Each mode alone keeps linear and angular momentum.
   /// An edge whose points coincide (closer than 1e-9 of its length at rest) has its direction at rest.
   template <class Visit>
-  void visit_damping_modes(const Points<4>& p, const Visit& visit) const {
+  [[gnu::always_inline]] void visit_damping_modes(const Points<4>& p, const Visit& visit) const {
     // Rows of the inverse are x, y, z; the edges at rest are y x z, z x x, x x y over its determinant 1 / 6V0.
     const Triple x = row(0), y = row(1), z = row(2);
     const Triple yz = cross(y, z);
