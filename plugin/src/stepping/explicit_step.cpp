@@ -9,6 +9,7 @@
 #include "coupling.h"
 #include "energy_guard.h"
 #include "joints.h"
+#include "kick.h"
 #include "particle_contacts.h"
 #include "restitution.h"
 #include "rigid_contacts.h"
@@ -28,28 +29,6 @@ constexpr Real particle_tolerance = 1e-2;  // this with soft ones,
 constexpr Real negligible_change = 0.2;    // or of what accelerations make of them
 constexpr int fewest_on_held = 8;          // substeps where a rigid body may lie on points that are held
 constexpr Real substep_memory = 0.8;       // share of the last step's substeps that the next one starts from
-
-// v += kick_time * (f / m + g), of which a pinned particle keeps its velocity, and x += drift_time * v in the same pass
-// over the particles. Whole columns, whose last number stays zero: that takes fewer instructions than three numbers.
-template <bool drifts = false>
-void kick(SteppedBody& body, Real kick_time, [[maybe_unused]] Real drift_time = 0) {
-  using Column = Eigen::Matrix<Real, 4, 1>;
-  const Real* f = body.forces.data();
-  Real* v = body.particles.velocities.data();
-  Real* x = body.particles.positions.data();
-  Column dv;
-  dv << kick_time * body.gravity, 0;
-  for (const Real inverse_mass : body.particles.inverse_masses) {
-    Eigen::Map<Column, Eigen::Aligned16> velocity(v), position(x);
-    if (inverse_mass > 0) velocity += kick_time * inverse_mass * Eigen::Map<const Column, Eigen::Aligned16>(f) + dv;
-    if constexpr (drifts) position += drift_time * velocity;
-    f += 4;
-    v += 4;
-    x += 4;
-  }
-}
-
-void drift(SteppedBody& body, Real time) { body.particles.positions += time * body.particles.velocities; }
 
 bool damps(const SteppedBody& body) { return body.options.damping_time > 0 || body.field->damps(); }
 bool damps(const Coupling& coupling) { return coupling.damping_time > 0 || coupling.field->damps(); }
@@ -144,7 +123,7 @@ class SubCycle {
       solve_contacts(h, h, [&] { surfaces_.sweep(h, remaining_, since_contacts_, [this, h] { return sweep(h); }); });
       for (SteppedBody* body : island_.bodies) drift(*body, h);
     } else {
-      for (SteppedBody* body : island_.bodies) kick<true>(*body, kick_time, h);
+      for (SteppedBody* body : island_.bodies) kick_and_drift(*body, kick_time, h);
     }
     for (RigidBody& body : island_.rigid_bodies) body.drift(h);
     surfaces_.drifted(h);
