@@ -56,8 +56,14 @@ void expect_guarded(const Matrix3& map, const std::string& name, Real total_grow
 // A step is repeated when energy grows by more than half a per cent, so no step may show more; and since the errors of
 // a symplectic method do not all point the same way, in all it stays far below 1.005^180 = 2.45 times: a hundredth is
 // four times what was measured.
-TEST(EnergyGuard, HoldsABeamStretchedTwofold) { expect_guarded(Vector3(2, 1, 1).asDiagonal(), "stretched_2", 0.01); }
-TEST(EnergyGuard, HoldsABeamStretchedThreefold) { expect_guarded(Vector3(3, 1, 1).asDiagonal(), "stretched_3", 0.01); }
+// After some of these the energy swings as widely in twice the substeps, and no work from outside is to blame.
+TEST(EnergyGuard, HoldsAStretchedBeam) {
+  for (int k = 0; k <= 50; ++k) {
+    const Real stretch = 2 + 0.05 * k;
+    SCOPED_TRACE(stretch);
+    expect_guarded(Vector3(stretch, 1, 1).asDiagonal(), "stretched_" + std::to_string(stretch), 0.01);
+  }
+}
 TEST(EnergyGuard, HoldsABeamBlownUpTwofold) { expect_guarded(Vector3(2, 2, 2).asDiagonal(), "blown_up_2", 0.01); }
 TEST(EnergyGuard, HoldsAMirroredBeam) { expect_guarded(Vector3(1, -1, 1).asDiagonal(), "mirrored", 0.01); }
 TEST(EnergyGuard, HoldsABeamReflectedInItsOrigin) { expect_guarded(-Matrix3::Identity(), "reflected", 0.01); }

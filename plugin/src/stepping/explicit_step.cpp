@@ -104,6 +104,9 @@ class SubCycle {
            anchors_.outside_work();
   }  // of obstacles, of driven particles, of taking depth back [J]
 
+  // Of a body by itself all is booked.
+  bool may_have_unbooked_work() const { return has_contacts_ || has_driven_particles_ || !island_.couplings.empty(); }
+
  private:
   // What is met in the sweeps of a substep.
   template <class Call>
@@ -351,10 +354,12 @@ void advance_explicitly(Island& island, Real duration) {
         .allowed = start_energy + cycle.outside_work() + surfaces.outside_work() + constant_force_work(island),
         .noise = tolerance * std::max(start_energy, end_energy) + noise + contact_noise / substeps};
   };
-  const GuardedStep step =
-      guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
-                   {.most_substeps = most_substeps, .factor = retry_growth, .increment = 1, .forgives_outside = true},
-                   attempt, [&] { undo(island, surfaces); });
+  const GuardedStep step = guard_energy(wanted_substeps(island, surfaces, duration), start_energy,
+                                        {.most_substeps = most_substeps,
+                                         .factor = retry_growth,
+                                         .increment = 1,
+                                         .forgives_outside = cycle.may_have_unbooked_work()},
+                                        attempt, [&] { undo(island, surfaces); });
 
   for (SteppedBody* body : island.bodies) {
     body->report.substeps = step.attempt.substeps;
