@@ -27,6 +27,7 @@ function(readme_cpp_test name line code)
     if(TARGET bullet_penalty${suffix})
       add_executable(readme_${name}${suffix} ${penalty_readme_work}/${name}.cpp)
       target_link_libraries(readme_${name}${suffix} PRIVATE BulletPenalty::bullet_penalty${suffix})
+      target_compile_options(readme_${name}${suffix} PRIVATE $<$<CONFIG:Release>:-O1>)  # as the tests: half the time
       if(TARGET BulletPenalty::surface)
         target_link_libraries(readme_${name}${suffix} PRIVATE BulletPenalty::surface)
       endif()
