@@ -14,7 +14,7 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real radius = 0.4, clearance = 0.3;  // of the nozzle above the ground [m]
-constexpr Sheet rubber{.young = 4e4, .thickness = 5e-4, .density = 1000};
+constexpr Fabric rubber{{.young = 4e4, .poisson = poisson_of_springs, .density = 1000}, {.thickness = 5e-4}};
 constexpr Real damping = 0.004;  // [s]
 /// Of the substeps: stretched by s, the skin has s² times the gradient of its rest shape; and the ledger is to hold.
 constexpr Real safety = 0.15;
@@ -61,7 +61,7 @@ BodyMesh balloon_body(const SceneOptions& options) {
 SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
   if (options.poisson || options.young || options.stiffness)
     throw std::invalid_argument("scene balloon has a skin of its own: --young, --poisson and --stiffness do not apply");
-  PotentialField field = shell_field(body.shell(), rubber);
+  PotentialField field = rubber.field_of(body.shell());
   std::vector<int> everyone(static_cast<std::size_t>(body.vertices().cols()));
   std::iota(everyone.begin(), everyone.end(), 0);
   field.add(EnclosedVolume(body.shell().triangles), std::vector<std::vector<int>>{everyone}, volume_stiffness);
@@ -76,7 +76,7 @@ SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
       .bodies =
           alone({.mesh = body,
                  .field = std::move(field),
-                 .mass = rubber.density * rubber.thickness * area(body.shell()),
+                 .mass = rubber.mass_of(body.shell()),
                  .positions = positions,
                  .pinned = {static_cast<int>(nozzle)},
                  .control = [](PotentialField& elements,

@@ -12,7 +12,8 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real width = 0.5, length = 0.9;  // [m]
-constexpr Sheet woven{.young = 6e5, .thickness = 1e-3, .density = 300, .bending = 0.3};
+constexpr Fabric woven{{.young = 6e5, .poisson = poisson_of_springs, .density = 300},
+                       {.thickness = 1e-3, .bending = 0.3}};
 constexpr Real damping = 0.005, drag = 1.5;                           // [s], of the air [1/s]
 const Vector3 wearer(0.12, 0.72, 0.22);                               // half extents, the first forward [m]
 constexpr Real height = 0.74, behind = 0.04;                          // of its middle, of the cape at its back [m]
@@ -64,7 +65,7 @@ class Stretch {
 
 SceneSetup cape(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
-  SceneCloth sheet = cloth_of("cape", options, body, woven);
+  SceneCloth sheet = cloth_of(options, body, woven);
 
   Eigen::Matrix3Xd hanging(3, rest.cols());
   std::vector<int> shoulders;

@@ -11,7 +11,7 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real size = 2, height = 1;  // [m]
-constexpr Sheet canvas{.young = 8e5, .thickness = 1e-3, .density = 300};
+constexpr Fabric canvas{{.young = 8e5, .poisson = poisson_of_springs, .density = 300}, {.thickness = 1e-3}};
 constexpr Real slack = 0.9;                                       // distance of the corners, of that in the flat sheet
 constexpr int pleats = 8;                                         // of the start, across its width
 constexpr Real damping = 0.01;                                    // [s]
@@ -32,7 +32,7 @@ BodyMesh cloth_body(const SceneOptions& options) {
 SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   const auto num_vertices = static_cast<int>(rest.cols());
-  SceneCloth sheet = cloth_of("cloth", options, body, canvas);
+  SceneCloth sheet = cloth_of(options, body, canvas);
 
   const int side = static_cast<int>(std::lround(std::sqrt(num_vertices)));
   const std::vector<int> corners{0, side - 1, num_vertices - side, num_vertices - 1};

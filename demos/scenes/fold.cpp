@@ -13,7 +13,8 @@ namespace penalty::demo {
 namespace {
 
 constexpr Real width = 1, length = 1.4;  // [m]
-constexpr Sheet woven{.young = 2e5, .thickness = 1e-3, .density = 300, .bending = 0.3};
+constexpr Fabric woven{{.young = 2e5, .poisson = poisson_of_springs, .density = 300},
+                       {.thickness = 1e-3, .bending = 0.3}};
 constexpr Real damping = 0.005;                      // [s]
 constexpr Real ball_radius = 0.2, clearance = 0.12;  // between ball and cloth [m]
 constexpr Real fold_radius = 0.04, wave = 0.02;      // of the fold at the top, of the waves of both layers [m]
@@ -42,7 +43,7 @@ Eigen::Matrix3Xd folded_over(const Eigen::Matrix3Xd& flat) {
 
 SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
-  SceneCloth sheet = cloth_of("fold", options, body, woven);
+  SceneCloth sheet = cloth_of(options, body, woven);
   const Start start = options.start.value_or(Start::rest);
   const Eigen::Matrix3Xd folded = folded_over(rest);
   const std::vector<Edge> edges = body.edges();

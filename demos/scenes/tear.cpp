@@ -9,11 +9,12 @@
 namespace penalty::demo {
 namespace {
 
-constexpr Real width = 1.6, height = 1, ground_clearance = 0.25;                      // [m]
-constexpr Sheet foil{.young = 1e6, .thickness = 1e-3, .density = 500, .bending = 0};  // limp
-constexpr Real damping = 0.003;                                                       // [s]
-constexpr Real notch = 0.25;                                                          // of the height, from below
-constexpr Real pull = 0.13;  // speed of the lower corners; the upper ones stay [m/s]
+constexpr Real width = 1.6, height = 1, ground_clearance = 0.25;  // [m]
+constexpr Fabric foil{{.young = 1e6, .poisson = poisson_of_springs, .density = 500},
+                      {.thickness = 1e-3, .bending = 0}};  // limp
+constexpr Real damping = 0.003;                            // [s]
+constexpr Real notch = 0.25;                               // of the height, from below
+constexpr Real pull = 0.13;                                // speed of the lower corners; the upper ones stay [m/s]
 constexpr Breaking strength{.upper = 0.15};
 constexpr Real safety = 0.2;   // of the substeps: what breaks sends out the fastest waves, and the ledger is to hold
 constexpr Real ripple = 2e-3;  // of the start, out of its plane: what is quite flat would stay so for ever [m]
@@ -53,7 +54,7 @@ SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
   if (options.poisson || options.young || options.stiffness)
     throw std::invalid_argument("scene tear has a sheet of its own: --young, --poisson and --stiffness do not apply");
   const Eigen::Matrix3Xd& rest = body.vertices();
-  PotentialField field = shell_field(body.shell(), foil);
+  PotentialField field = foil.field_of(body.shell());
   field.find<Length>()->set_breaking(strength);
 
   // Both ends are moved: pinned, with a velocity. Everything between starts with its share of it, so that nothing
@@ -73,7 +74,7 @@ SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
           .title = "A sheet rips",
           .bodies = alone({.mesh = body,
                            .field = std::move(field),
-                           .mass = foil.density * foil.thickness * area(body.shell()),
+                           .mass = foil.mass_of(body.shell()),
                            .positions = positions,
                            .velocities = velocities,
                            .pinned = ends}),

@@ -55,15 +55,15 @@ struct Material {
   }
 
   /// Throws std::invalid_argument that names the number out of range.
-  void check(ElasticModel model = ElasticModel::springs_volumes) const {
+  void check(ElasticModel model = ElasticModel::springs_volumes) const { check(least_poisson(model), name_of(model)); }
+  void check(Real least_poisson, const char* model) const {
     const auto require = [](bool ok, const char* name, Real value, const std::string& range) {
       if (!ok)
         throw std::invalid_argument(std::string("material: ") + name + " is " + to_text(value) + ", must be " + range);
     };
-    const Real least = least_poisson(model);
     require(young > 0 && young < 1e300, "Young's modulus", young, "positive and finite [Pa]");
-    require(poisson >= least * (1 - 1e-9) && poisson < 0.5, "Poisson's ratio", poisson,
-            "in [" + to_text(least) + ", 0.5) for " + name_of(model));
+    require(poisson >= least_poisson * (1 - 1e-9) && poisson < 0.5, "Poisson's ratio", poisson,
+            "in [" + to_text(least_poisson) + ", 0.5) for " + model);
     require(density > 0 && density < 1e300, "density", density, "positive and finite [kg/m³]");
     require(damping >= 0 && damping < 1e300, "damping", damping, "zero or positive [s]");
   }
