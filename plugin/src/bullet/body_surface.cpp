@@ -23,7 +23,15 @@ std::vector<Triangle> whole_triangles(const BodySurface& surface, const Potentia
   return triangles;
 }
 
-// Its own if it has one, faces if there are any, else links, else nodes.
+// Outer sides of the tetrahedra that are whole.
+std::vector<Triangle> skin_of(const btSoftBody& body, const PotentialField& field) {
+  const BrokenElements broken(field);
+  std::vector<Tetrahedron> tetrahedra = tetrahedra_of(body, field);
+  std::erase_if(tetrahedra, [&](const Tetrahedron& t) { return broken.cut(t); });
+  return boundary_faces(tetrahedra);
+}
+
+// Its own if it has one, else faces, those of tetrahedra, links or nodes: the first that there are.
 std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
   const btSoftBody& body = *held.body;
   const PackedVectors& rest = held.field.rest_positions();
@@ -41,14 +49,18 @@ std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
   };
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;
-  for (int k = 0; k < body.m_faces.size(); ++k) {
-    const auto& n = body.m_faces[k].m_n;
-    if (n[0] == n[1]) continue;  // torn
-    triangles.push_back({point_at(n[0]), point_at(n[1]), point_at(n[2])});
-  }
+  if (held.torn_faces.has_own(body))
+    for (int k = 0; k < body.m_faces.size(); ++k) {
+      const auto& n = body.m_faces[k].m_n;
+      if (n[0] == n[1]) continue;  // torn
+      triangles.push_back({point_at(n[0]), point_at(n[1]), point_at(n[2])});
+    }
+  else
+    for (const auto& [a, b, c] : skin_of(body, held.field))
+      triangles.push_back({point_at(&body.m_nodes[a]), point_at(&body.m_nodes[b]), point_at(&body.m_nodes[c])});
   for (const auto& [face, corners] : held.torn_faces.torn())
     for (const int i : corners) point_at(&body.m_nodes[i]);
-  if (body.m_faces.size() == 0)
+  if (points.empty())
     for (int k = 0; k < body.m_links.size(); ++k)
       edges.push_back({point_at(body.m_links[k].m_n[0]), point_at(body.m_links[k].m_n[1])});
   if (points.empty())

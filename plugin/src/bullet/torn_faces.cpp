@@ -36,25 +36,6 @@ std::map<Triangle, Triangle> by_corners(const std::vector<Triangle>& triangles) 
   return sorted_ones;
 }
 
-// Those of the body, or, of one that has none, those that the field is made of.
-std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field) {
-  std::vector<Tetrahedron> tetrahedra;
-  tetrahedra.reserve(body.m_tetras.size());
-  for (int k = 0; k < body.m_tetras.size(); ++k) tetrahedra.push_back(numbers_of(body, body.m_tetras[k].m_n));
-  if (!tetrahedra.empty()) return tetrahedra;
-  std::set<Tetrahedron> known;
-  const auto add = [&](const auto* batch) {
-    if (!batch) return;
-    for (const Tetrahedron& t : batch->stencils())
-      if (known.insert(sorted(t)).second) tetrahedra.push_back(t);
-  };
-  for (const auto& potential : field.potentials()) {
-    add(dynamic_cast<const Batch<TetrahedronVolume>*>(potential.get()));
-    add(dynamic_cast<const Batch<StableNeoHookean>*>(potential.get()));
-  }
-  return tetrahedra;
-}
-
 void set_corners(btSoftBody& body, int face, const Triangle& corners) {
   for (int k = 0; k < 3; ++k) body.m_faces[face].m_n[k] = &body.m_nodes[corners[k]];
 }
@@ -77,6 +58,27 @@ void append_face(btSoftBody& body, const Triangle& corners, const PackedVectors&
 }
 
 }  // namespace
+
+std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field) {
+  std::vector<Tetrahedron> tetrahedra;
+  tetrahedra.reserve(body.m_tetras.size());
+  for (int k = 0; k < body.m_tetras.size(); ++k) tetrahedra.push_back(numbers_of(body, body.m_tetras[k].m_n));
+  std::set<Tetrahedron> known;
+  const auto add = [&](const auto* batch) {
+    if (!batch) return;
+    for (const Tetrahedron& t : batch->stencils())
+      if (known.insert(sorted(t)).second) tetrahedra.push_back(t);
+  };
+  for (const auto& potential : field.potentials()) {
+    if (body.m_tetras.size() > 0) break;
+    add(dynamic_cast<const Batch<TetrahedronVolume>*>(potential.get()));
+    add(dynamic_cast<const Batch<StableNeoHookean>*>(potential.get()));
+  }
+  const std::vector<Real> volumes = signed_volumes(field.rest_positions().topRows<3>(), tetrahedra);
+  for (std::size_t t = 0; t < tetrahedra.size(); ++t)
+    if (volumes[t] < 0) std::swap(tetrahedra[t][2], tetrahedra[t][3]);
+  return tetrahedra;
+}
 
 bool TornFaces::update(btSoftBody& body, const PotentialField& field) {
   const BreakCount count = count_breaks(field);
@@ -127,6 +129,10 @@ bool TornFaces::give_back(btSoftBody& body) {
   while (appended && body.m_faces.size() > own_size_) body.m_faces.pop_back();
   *this = {};
   return true;
+}
+
+bool TornFaces::has_own(const btSoftBody& body) const {
+  return (body.m_faces.size() == size_ ? own_size_ : body.m_faces.size()) > 0;
 }
 
 }  // namespace penalty

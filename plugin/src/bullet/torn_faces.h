@@ -9,6 +9,9 @@ class btSoftBody;
 
 namespace penalty {
 
+/// Tetrahedra of the body, or, of one that has none, those that the field is made of: of positive volume at rest.
+std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field);
+
 /// Faces go with the elements that hold them: those that what broke cuts, and those of tetrahedra that it cuts. A torn face
 /// keeps its number, but all its corners are its first node: rays pass, nothing of it is drawn, no air pushes it. It is whole
 /// again when its elements are. The faces behind tetrahedra that went are appended; they look out of what is left.
@@ -27,6 +30,9 @@ class TornFaces {
   bool give_back(btSoftBody& body);
 
   const std::vector<Torn>& torn() const { return torn_; }
+
+  /// Whether the body has faces but for those that were appended here.
+  bool has_own(const btSoftBody& body) const;
 
  private:
   std::vector<Torn> torn_;

@@ -27,7 +27,8 @@ struct AttachOptions {
   StepOptions step;
   /// Where the body may touch rigid bodies; empty: every node. Weighted points follow an embedded surface.
   std::vector<WeightedPoint> contact_points = {};
-  /// What touches other soft bodies, and the body itself; empty: its faces, or its links if it has none.
+  /// What touches other soft bodies, and the body itself; empty: its faces, else the outer ones of its
+  /// tetrahedra, else its links.
   BodySurface surface = {};
   /// Whether it touches itself. Unless said: if its surface is open, as that of cloth is.
   std::optional<bool> self_contact = {};
