@@ -1,10 +1,10 @@
-// Bullet soft bodies from tetrahedral meshes and from surfaces.
+// Bullet soft bodies from tetrahedral meshes and from surfaces, and fields for those that are there.
 #pragma once
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "penalty/energy/material.h"
+#include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/tet_mesh.h"
 #include "penalty/mesh/triangle_surface.h"
 
@@ -45,5 +45,28 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
                                            const Material& material, Real thickness,
                                            const SoftBodyOptions& options = {});
+
+struct BodyFieldOptions {
+  ElasticModel model = ElasticModel::springs_volumes;  // of the tetrahedra
+  /// Of what has faces but no tetrahedra [m]; unless said, so thick that density times volume is the mass of its nodes.
+  std::optional<Real> thickness = {};
+  Real bending = 1;  // see Sheet
+  /// Cross section of what is made of links alone [m²]; unless said, by mass and density as well.
+  std::optional<Real> section = {};
+};
+
+/// The field of a soft body as it is, whoever made it: Bullet's helpers, a file or the application. `attach` it, and the
+/// body is of this material where its links were tuned by hand.
+///
+///     tetrahedra                                 elements of the model, see make_elastic_field
+///     faces that are no side of a tetrahedron    a sheet, see make_sheet_field
+///     links beside these                         springs of stiffness E A / L [N/m]
+///
+/// Positions of the nodes are the rest shape: take the field before the body is deformed. A link gives its edge its rest
+/// length, and its m_kLST the share of the material's stiffness; that of an edge inside a solid does nothing. Links that
+/// Bullet makes against bending (generateBendingConstraints) are left out where hinges stand for them. The mass stays
+/// what it is. Throws std::invalid_argument that names the body's node, link, face or tetrahedron, or the number out of
+/// range.
+PotentialField make_field(const btSoftBody& body, const Material& material, const BodyFieldOptions& options = {});
 
 }  // namespace penalty
