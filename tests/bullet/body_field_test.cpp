@@ -67,6 +67,7 @@ std::unique_ptr<btSoftBody> of_triangles(btSoftBodyWorldInfo& info, const Triang
 
 std::unique_ptr<btSoftBody> hull(btSoftBodyWorldInfo& info) {
   std::vector<btVector3> corners;
+  corners.reserve(8);
   for (int k = 0; k < 8; ++k) corners.emplace_back(k & 1 ? 1 : 0, k & 2 ? 1 : 0, k & 4 ? 1 : 0);
   return owned(btSoftBodyHelpers::CreateFromConvexHull(info, corners.data(), 8));
 }

@@ -19,10 +19,25 @@ class JointKinds : public RigidJoints {
  protected:
   static btRigidBody& the_world() { return btTypedConstraint::getFixedBody(); }
 
+  static void damp_along_x(btGeneric6DofSpring2Constraint& joint, Real damping) {
+    joint.setLinearLowerLimit({1, 0, 0});  // free
+    joint.setLinearUpperLimit({-1, 0, 0});
+    joint.enableSpring(0, true);
+    joint.setStiffness(0, 0, false);
+    joint.setDamping(0, static_cast<btScalar>(damping), false);
+  }
+
   // On top of a plate, with its weight.
   btSoftBody& add_load(Real mass) {
     return sim.add_jelly(make_box({1, 0.2, 1}, {5, 1, 5}),
                          {.shift = {0, 0.075, 0}, .body = {.mass = mass}, .attach = {.step = {.damping_time = 0.02}}});
+  }
+  // Next to no mass, tied to a plate: its joints are in our step.
+  btSoftBody& add_rider(btRigidBody& plate) {
+    btSoftBody& rider = sim.add_jelly(make_box({0.1, 0.1, 0.1}, {1, 1, 1}),
+                                      {.stiffness = 1e-6, .shift = {0.5, 0.2, 0.5}, .body = {.mass = 1e-6}});
+    rider.appendAnchor(0, &plate, true);
+    return rider;
   }
   // Without weight, beside a plate at the origin: near, but not touched.
   btSoftBody& add_bystander() { return sim.add_jelly(make_box({1, 0.2, 1}, {5, 1, 5}), {.shift = {0, 0.085, 0}}); }
@@ -110,6 +125,68 @@ TEST_P(JointKinds, ADamperThatIsStrongerThanItsSpringLetsItCreep) {
     const Real x = start * (fast * std::exp(-slow * t) - slow * std::exp(-fast * t)) / (fast - slow);
     EXPECT_NEAR(center(plate).x() - 0.5 + start, x, 0.01 * start) << k;
   }
+}
+
+// Without a spring what moves at v0 goes v0 m / c in all, and never back.
+TEST_P(JointKinds, ADamperOfAnyStrengthTakesTheSpeed) {
+  sim.set_gravity({0, 0, 0});
+  const Real mass = 5;
+  for (const Real strength : {0.1, 1.0, 10.0, 1e3, 1e6}) {  // c h / m, h a frame
+    SCOPED_TRACE(strength);
+    const Real damping = strength * mass / frame;
+    btRigidBody& plate = sim.add_box({0.6, 0.05, 0.6}, mass, {0.5, 0, 0.5});
+    auto& joint = add<btGeneric6DofSpring2Constraint>(the_world(), plate, at_point({0.5, 0, 0.5}), at_point({0, 0, 0}));
+    damp_along_x(joint, damping);
+    joint.setAngularLowerLimit({0, 0, 0});
+    joint.setAngularUpperLimit({0, 0, 0});
+    plate.setLinearVelocity({1, 0, 0});
+    btSoftBody& rider = add_rider(plate);
+    sim.step(frame, 60);
+    const Real way = mass / damping * -std::expm1(-damping / mass);
+    EXPECT_NEAR(center(plate).x() - 0.5, way, 0.02 * way + 0.5 * frame / 8);  // of half a substep at v0
+    EXPECT_GT(center(plate).x() - 0.5, -limit(1e-12, 1e-6));
+    EXPECT_NEAR(Real(plate.getLinearVelocity().x()), std::exp(-damping / mass), 2e-3);
+    sim.remove(rider);
+    remove(joint);
+    sim.remove(plate);
+  }
+}
+
+// Far from the centre of a body a damper moves more than its mass.
+TEST_P(JointKinds, ADamperOnALeverTakesEnergyOnly) {
+  sim.set_gravity({0, 0, 0});
+  const Real mass = 5;
+  for (const bool is_pair : {false, true})
+    for (const Real strength : {0.3, 3.0, 30.0, 1e4}) {
+      SCOPED_TRACE(std::to_string(strength) + (is_pair ? ", two bodies" : ", one body"));
+      btRigidBody& plate = sim.add_box({0.6, 0.05, 0.6}, mass, {0.5, 0, 0.5});
+      btRigidBody& heavy = sim.add_box({0.2, 0.2, 0.2}, 100 * mass, {3, 0, 3});
+      auto& joint = add<btGeneric6DofSpring2Constraint>(
+          is_pair ? heavy : the_world(), plate, at_point(is_pair ? Vector3(-1.9, 0, -3.1) : Vector3(1.1, 0, -0.1)),
+          at_point({0.6, 0, -0.6}));
+      damp_along_x(joint, strength * mass / frame);
+      for (int axis = 3; axis < 6; ++axis) joint.setLimit(axis, 1, -1);
+      plate.setLinearVelocity({1, 0, 0});
+      plate.setAngularVelocity({0, 3, 0});
+      btSoftBody& rider = add_rider(plate);
+      Real last = sim.totals().energy;
+      const Totals start = sim.totals();
+      for (int k = 0; k < 60; ++k) {
+        sim.step(frame);
+        const Real energy = sim.totals().energy;
+        ASSERT_LE(energy, last + 1e-3 * start.energy) << k;
+        last = energy;
+      }
+      EXPECT_LT(last, 0.9 * start.energy);
+      if (is_pair) {
+        EXPECT_LT((sim.totals().momentum - start.momentum).norm(), limit(1e-10, 1e-4));
+        EXPECT_LT((sim.totals().angular_momentum - start.angular_momentum).norm(), limit(1e-8, 1e-3));  // of 8
+      }
+      sim.remove(rider);
+      remove(joint);
+      sim.remove(heavy);
+      sim.remove(plate);
+    }
 }
 
 // Two wheels on axles in the world: a motor turns one, and the gear the other.

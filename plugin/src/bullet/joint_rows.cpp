@@ -34,6 +34,15 @@ struct BulletRow {
 };
 using BulletRows = std::array<BulletRow, Joint::most_rows>;
 
+// Impulses of a spring and its damper in a time, of which Bullet's limits are the damper's and the sum of both: of the
+// spring where nothing moves, and then of the damper.
+Real impulse_of_spring(const BulletRow& at_rest) { return Real(at_rest.least) + Real(at_rest.most); }
+Real impulse_of_damper(const BulletRow& row, Real of_spring) {
+  const Real least = row.least, most = row.most;
+  if (of_spring >= 0) return least < 0 ? least : std::max<Real>(most - of_spring, 0);
+  return most > 0 ? most : std::min<Real>(least - of_spring, 0);
+}
+
 // `rate` is one over the time in which errors of position are to go, but for what erp says of that.
 void ask(btTypedConstraint& constraint, int count, Real rate, btScalar erp, const btContactSolverInfo& how,
          BulletRows& rows) {
@@ -80,9 +89,10 @@ struct Ends {
   Real sum(const JointRow& row, const Of& of) const {
     return (a ? of(*a, row.linear_a, row.angular_a) : 0) + (b ? of(*b, row.linear_b, row.angular_b) : 0);
   }
-  Real speed_before(const JointRow& row, Real since) const {
-    return sum(row, [since](const RigidBody& body, const Vector3& linear, const Vector3& angular) {
-      return linear.dot(velocity_before(body, since)) + angular.dot(angular_velocity_before(body, since));
+  /// Of unit velocities along the row.
+  Real speed_along(const JointRow& row) const {
+    return sum(row, [](const RigidBody&, const Vector3& linear, const Vector3& angular) {
+      return linear.squaredNorm() + angular.squaredNorm();
     });
   }
   Real mobility(const JointRow& row) const {
@@ -90,6 +100,29 @@ struct Ends {
       return linear.dot(body.inverse_mass.cwiseProduct(linear)) + angular.dot(body.inverse_inertia * angular);
     });
   }
+};
+
+// Velocities of both bodies of a joint, for as long as this lives.
+class MovedEnds {
+ public:
+  MovedEnds(btTypedConstraint& constraint)
+      : a_(constraint.getRigidBodyA()),
+        b_(constraint.getRigidBodyB()),
+        before_{a_.getLinearVelocity(), a_.getAngularVelocity(), b_.getLinearVelocity(), b_.getAngularVelocity()} {}
+  MovedEnds(const MovedEnds&) = delete;
+  MovedEnds& operator=(const MovedEnds&) = delete;
+  ~MovedEnds() { set(before_); }
+
+  void set(const std::array<btVector3, 4>& velocities) {
+    a_.setLinearVelocity(velocities[0]);
+    a_.setAngularVelocity(velocities[1]);
+    b_.setLinearVelocity(velocities[2]);
+    b_.setAngularVelocity(velocities[3]);
+  }
+
+ private:
+  btRigidBody &a_, &b_;
+  std::array<btVector3, 4> before_;
 };
 
 }  // namespace
@@ -136,9 +169,11 @@ void JointRows::add_rows(std::span<const RigidBody> bodies, Real h, Real since, 
 
 // Limits are impulses of a world step, of which the substep has its share. Where there are none, errors are taken back in
 // one drift: what Bullet says for two rates tells them from speeds. What is soft, and what has limits, is to be as it is
-// with Bullet, whose erp and cfm speak of world steps. Springs speak of forces, which are those of now.
+// with Bullet, whose erp and cfm speak of world steps. Springs speak of forces, which are those of now; dampers of the
+// velocity that there will be, however strong they are:  impulse = since (force of the spring - d u).
 void JointRows::add_rows_of(int number, std::span<const RigidBody> bodies, Real h, Real since,
                             std::vector<JointRow>& rows) {
+  const btVector3 none(0, 0, 0);
   const HeldJoint& held = joints_[number];
   btTypedConstraint& constraint = *held.constraint;
   const int count = count_rows(constraint);
@@ -159,8 +194,21 @@ void JointRows::add_rows_of(int number, std::span<const RigidBody> bodies, Real 
                  .angular_b = to_vector(asked.angular_b)};
     if (ends.a && ends.b) make_one_line(row, from_b_to_a);
     if (asked.is_force()) {
-      const bool pushes = Real(asked.error) > ends.speed_before(row, since);
-      row.least = row.most = since / h * Real(pushes ? asked.most : asked.least);
+      MovedEnds moved(constraint);
+      BulletRows tried;
+      moved.set({none, none, none, none});
+      ask(constraint, count, 1 / h, 1, info_, tried);
+      const Real of_spring = impulse_of_spring(tried[k]);
+      moved.set({ends.a ? asked.linear_a : none, ends.a ? asked.angular_a : none, ends.b ? asked.linear_b : none,
+                 ends.b ? asked.angular_b : none});
+      ask(constraint, count, 1 / h, 1, info_, tried);
+      const Real damping = -impulse_of_damper(tried[k], of_spring) / (h * ends.speed_along(row));  // d
+      if (since > 0 && damping > 0) {
+        row.softness = 1 / (since * damping);
+        row.wanted = of_spring / (h * damping);
+      } else {
+        row.least = row.most = since / h * of_spring;
+      }
     } else if (asked.is_soft() || (asked.has_least() && asked.has_most())) {
       const BulletRow& in_step = as_bullet[k];
       const Real share = since / duration_;
