@@ -29,19 +29,17 @@ namespace penalty::rows {
 
 using Row = Real __attribute__((vector_size(32)));
 
-/// Four reals in memory, aligned as particles are.
-using RowInMemory = Real __attribute__((vector_size(32), aligned(8), may_alias));
-
-[[gnu::always_inline]] inline Row load(const Real* p) { return *reinterpret_cast<const RowInMemory*>(p); }
+// Particles are aligned to 16 bytes, and some of what is read is between them.
+[[gnu::always_inline]] inline Row load(const Real* p) { return _mm256_loadu_pd(p); }
+[[gnu::always_inline]] inline void store(Real* p, Row row) { _mm256_storeu_pd(p, row); }
 [[gnu::always_inline]] inline Row load(const Real* vectors, int i) {
   return load(vectors + 4 * static_cast<std::size_t>(i));
 }
-[[gnu::always_inline]] inline void store(Real* p, Row row) { *reinterpret_cast<RowInMemory*>(p) = row; }
 [[gnu::always_inline]] inline void add(Real* vectors, int i, Row row) {
-  *reinterpret_cast<RowInMemory*>(vectors + 4 * static_cast<std::size_t>(i)) += row;
+  store(vectors + 4 * static_cast<std::size_t>(i), load(vectors, i) + row);
 }
 [[gnu::always_inline]] inline void subtract(Real* vectors, int i, Row row) {
-  *reinterpret_cast<RowInMemory*>(vectors + 4 * static_cast<std::size_t>(i)) -= row;
+  store(vectors + 4 * static_cast<std::size_t>(i), load(vectors, i) - row);
 }
 
 [[gnu::always_inline]] inline Row yzx(Row a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }

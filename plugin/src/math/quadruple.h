@@ -1,14 +1,16 @@
 // Four reals at once, a particle and what pads it: for loops over particles that the compiler is to see as such.
 #pragma once
+#include <cstring>
+
 #include "penalty/math/types.h"
 
 namespace penalty {
 
-using Quadruple = Real __attribute__((vector_size(32), aligned(8), may_alias));
+using Quadruple = Real __attribute__((vector_size(32)));
 
-[[gnu::always_inline]] inline const Quadruple& quadruple(const Real* p) {
-  return *reinterpret_cast<const Quadruple*>(p);
-}
-[[gnu::always_inline]] inline Quadruple& quadruple(Real* p) { return *reinterpret_cast<Quadruple*>(p); }
+// Particles are aligned to half of what such a register would like. By reference, as functions for any processor have no
+// way to return one.
+[[gnu::always_inline]] inline void load(const Real* p, Quadruple& q) { std::memcpy(&q, p, sizeof q); }
+[[gnu::always_inline]] inline void store(Real* p, const Quadruple& q) { std::memcpy(p, &q, sizeof q); }
 
 }  // namespace penalty

@@ -15,8 +15,18 @@ void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const 
                   [[maybe_unused]] Real drift_time, Real* v, [[maybe_unused]] Real* x) {
   const Quadruple dv = {kick_time * acceleration[0], kick_time * acceleration[1], kick_time * acceleration[2], 0};
   for (const Real inverse_mass : inverse_masses) {
-    if (inverse_mass > 0) quadruple(v) += quadruple(f) * (kick_time * inverse_mass) + dv;
-    if constexpr (drifts) quadruple(x) += quadruple(v) * drift_time;
+    Quadruple velocity, force;
+    load(v, velocity);
+    if (inverse_mass > 0) {
+      load(f, force);
+      velocity += force * (kick_time * inverse_mass) + dv;
+      store(v, velocity);
+    }
+    if constexpr (drifts) {
+      Quadruple place;
+      load(x, place);
+      store(x, place + velocity * drift_time);
+    }
     f += 4;
     v += 4;
     x += 4;
@@ -27,7 +37,12 @@ void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const 
 [[gnu::target_clones("arch=x86-64-v3", "default")]]
 #endif
 void drift_columns(Eigen::Index size, Real time, const Real* v, Real* x) {
-  for (Eigen::Index i = 0; i < 4 * size; i += 4) quadruple(x + i) += quadruple(v + i) * time;
+  Quadruple place, velocity;
+  for (Eigen::Index i = 0; i < 4 * size; i += 4) {
+    load(x + i, place);
+    load(v + i, velocity);
+    store(x + i, place + velocity * time);
+  }
 }
 
 }  // namespace
