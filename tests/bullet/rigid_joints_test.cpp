@@ -244,6 +244,32 @@ TEST_P(RigidJoints, SlidersOnTheSameLineLetABlockBePulledAlongIt) {
   }
 }
 
+// Of what the joint answers in a substep the anchor is to leave nothing for the next.
+TEST_P(RigidJoints, AnAnchorOfPartialInfluencePullsOnABodyOnAPivot) {
+  for (const Real influence : {0.02, 0.1, 0.3, 0.6}) {
+    SCOPED_TRACE(influence);
+    Simulation own(GetParam());
+    own.set_gravity({0, 0, 0});
+    btRigidBody& block = own.add_box({0.3, 0.5, 0.2}, 6, {0, 2, 0});
+    block.setActivationState(DISABLE_DEACTIVATION);
+    btPoint2PointConstraint pivot(block, btVector3(btScalar(0.8), btScalar(0.4), 0));
+    own.world().addConstraint(&pivot, true);
+    const Vector3 held = on(block, {0.8, 0.4, 0});
+    btSoftBody& cube =
+        own.add_jelly(make_box({1, 1, 1}, {2, 2, 2}), {.stiffness = 1e3, .shift = {2, 2, 0}, .body = {.mass = 2}});
+    cube.appendAnchor(5, &block, btVector3(btScalar(-0.3), btScalar(-0.5), btScalar(0.2)), true, btScalar(influence));
+    for (int i = 0; i < cube.m_nodes.size(); ++i) cube.m_nodes[i].m_v = {10, 3, 1};
+    const Real start = 2.0 / 2 * (100 + 9 + 1);  // [J]
+    for (int k = 0; k < 60; ++k) {
+      own.step(frame);
+      ASSERT_TRUE(own.penalty().report(cube).finite) << "frame " << k;
+      ASSERT_LE(own.totals().energy, 1.01 * start) << "frame " << k;
+      EXPECT_LT((on(block, {0.8, 0.4, 0}) - held).norm(), 0.01) << "frame " << k;
+    }
+    own.world().removeConstraint(&pivot);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(BothWorlds, RigidJoints, both_worlds(), param_name);
 
 }  // namespace

@@ -153,7 +153,7 @@ void Anchors::push(const Point& point, Row& row, const Vector3& impulse) {
   row.impulse += impulse;
 }
 
-void Anchors::begin(Real h, Real since) {
+void Anchors::begin(Real h) {
   for (const Point& point : points_) {
     const Vector3 x = point.point->of(point.body->particles.positions);
     for (std::size_t k = point.first; k < point.end; ++k) {
@@ -169,6 +169,9 @@ void Anchors::begin(Real h, Real since) {
   }
   for (Block& block : blocks_)
     if (!block.rigid.empty()) invert(block);
+}
+
+void Anchors::start(Real since) {
   for (const Point& point : points_)
     for (std::size_t k = point.first; k < point.end; ++k)
       if (!rows_[k].force.isZero(0)) push(point, rows_[k], since * rows_[k].force);

@@ -26,9 +26,12 @@ class Anchors {
 
   bool is_empty() const { return island_.anchors.empty(); }
 
-  /// Before the sweeps of a drift of h [s]; `since` [s] is how long forces acted since the last: as in the last one, they
-  /// are met by its impulses.
-  void begin(Real h, Real since);
+  /// Before the sweeps of a drift of h [s], and before anything gives an impulse: of the velocity that there is now an
+  /// anchor of partial influence leaves its share.
+  void begin(Real h);
+
+  /// Meets the forces that acted for `since` [s] as in the last drift, by its impulses.
+  void start(Real since);
 
   /// Returns the largest change of a relative velocity [m/s].
   Real sweep();

@@ -155,10 +155,11 @@ class SubCycle {
   void solve_contacts(Real kick_time, Real h, const Solve& solve) {
     for (SteppedBody* body : island_.bodies) body->before_contacts = body->particles.velocities;
     sweeps_ = 0;
+    anchors_.begin(h);
     rigid_contacts_.begin(h, since_contacts_);
     joints_.begin(h, since_contacts_, kick_time > 0);  // no drift follows where no kick is counted
     particle_contacts_.begin(h, since_contacts_);
-    anchors_.begin(h, since_contacts_);
+    anchors_.start(since_contacts_);
     solve();
     for_each_constraint([this](auto& constraints) { constraints.end(since_contacts_); });
     since_contacts_ = 0;
