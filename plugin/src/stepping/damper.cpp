@@ -43,20 +43,20 @@ void end_stage(const Particles& particles, const Vector3& linear, const Vector3&
   const Quadruple from_x = {0, angular[2], -angular[1], 0}, from_y = {-angular[2], 0, angular[0], 0},
                   from_z = {angular[1], -angular[0], 0, 0}, common = {linear[0], linear[1], linear[2], 0};
   Quadruple first, arm, velocity, changed, before, force;
-  load(x, first);
+  load_quadruple(x, first);
   for (const Real inverse_mass : particles.inverse_masses) {
-    load(x, arm);
-    load(v, velocity);
-    load(change, changed);
-    load(change_before, before);
-    load(product, force);
+    load_quadruple(x, arm);
+    load_quadruple(v, velocity);
+    load_quadruple(change, changed);
+    load_quadruple(change_before, before);
+    load_quadruple(product, force);
     const Real divisor = inverse_mass > 0 ? inverse_mass : 1;
     changed = changed * a + before * b - force * (c * divisor);
     arm -= first;
     velocity -= common + from_x * arm[0] + from_y * arm[1] + from_z * arm[2];
-    store(change_before, changed);
-    store(now, inverse_mass > 0 ? velocity + changed : velocity);
-    store(product, Quadruple{});
+    store_quadruple(change_before, changed);
+    store_quadruple(now, inverse_mass > 0 ? velocity + changed : velocity);
+    store_quadruple(product, Quadruple{});
     change += 4;
     change_before += 4;
     product += 4;

@@ -16,16 +16,16 @@ void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const 
   const Quadruple dv = {kick_time * acceleration[0], kick_time * acceleration[1], kick_time * acceleration[2], 0};
   for (const Real inverse_mass : inverse_masses) {
     Quadruple velocity, force;
-    load(v, velocity);
+    load_quadruple(v, velocity);
     if (inverse_mass > 0) {
-      load(f, force);
+      load_quadruple(f, force);
       velocity += force * (kick_time * inverse_mass) + dv;
-      store(v, velocity);
+      store_quadruple(v, velocity);
     }
     if constexpr (drifts) {
       Quadruple place;
-      load(x, place);
-      store(x, place + velocity * drift_time);
+      load_quadruple(x, place);
+      store_quadruple(x, place + velocity * drift_time);
     }
     f += 4;
     v += 4;
@@ -39,9 +39,9 @@ void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const 
 void drift_columns(Eigen::Index size, Real time, const Real* v, Real* x) {
   Quadruple place, velocity;
   for (Eigen::Index i = 0; i < 4 * size; i += 4) {
-    load(x + i, place);
-    load(v + i, velocity);
-    store(x + i, place + velocity * time);
+    load_quadruple(x + i, place);
+    load_quadruple(v + i, velocity);
+    store_quadruple(x + i, place + velocity * time);
   }
 }
 
