@@ -198,6 +198,29 @@ TEST_P(Tearing, FacesLookOutOfWhatIsLeftAndAreGivenBack) {
   EXPECT_NEAR(2 * hit(body, {0.3, 2, 0.33}, {0.3, 0, 0.33}), 2 - stretch, 0.02);
 }
 
+// Far from its rest shape a body goes by its soft phase, whose elements must not hold what broke in the stiff one.
+TEST_P(Tearing, PiecesOfABodyOfTwoPhasesFlyWithWhatTheyHad) {
+  sim.set_gravity({0, 0, 0});
+  const TetMesh cube = make_box({1, 1, 1}, {2, 2, 2});
+  btSoftBody& body = sim.add(make_soft_body(sim.info(), cube, {.mass = 1}));
+  PotentialField field = make_recovering_field(cube.vertices, cube.tetrahedra, Material{.young = 1e5, .poisson = 0.45});
+  field.batch<StableNeoHookean>().set_breaking({.upper = 0.5});
+  sim.penalty().attach(body, std::move(field));
+  sim.step(frame);
+  body.scale({btScalar(1.35), btScalar(1.35), 1});
+  sim.step(frame);
+  const auto flows = [&] { return sim.penalty().flows(body); };
+  const Real given = flows().changes;
+  ASSERT_GT(flows().inelastic, 0.1 * given);
+  for (int k = 0; k < 30; ++k) {
+    sim.step(frame);
+    const StepReport& report = sim.penalty().report(body);
+    ASSERT_TRUE(report.finite) << report.problem;
+    ASSERT_NEAR(flows().changes, given, limit(1e-9, 1e-4) * given) << "frame " << k;
+    ASSERT_LE(report.elastic_energy + report.kinetic_energy + flows().inelastic, 1.01 * given) << "frame " << k;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Worlds, Tearing, both_worlds(), param_name);
 
 }  // namespace

@@ -1,4 +1,6 @@
 // Fields of two phases: soft far from rest, stiff near it.
+#include <algorithm>
+#include <functional>
 
 #include "fields/meshes.h"
 
@@ -139,6 +141,133 @@ TEST(TwoPhase, ListsBothPhasesAndCountsTheOneThatActs) {
     EXPECT_NEAR(sum, cube.field.energy(x), 1e-12 * sum);
     EXPECT_NEAR(ledger[acts].energy, sum, 1e-12 * sum);
   }
+}
+
+// Elements of a batch that break next, where they are stretched.
+template <class Kind>
+void weaken(Batch<Kind>& batch, const std::function<bool(const StencilOf<Kind>&)>& which) {
+  for (int e = 0; e < static_cast<int>(batch.num_elements()); ++e)
+    if (which(batch.stencils()[e])) batch.set_breaking(e, {.upper = 0.1});
+}
+
+template <class Kind>
+std::vector<bool> enabled(const Batch<Kind>& batch) {
+  std::vector<bool> all;
+  all.reserve(batch.num_elements());
+  for (int e = 0; e < static_cast<int>(batch.num_elements()); ++e) all.push_back(batch.is_enabled(e));
+  return all;
+}
+
+bool contains(std::span<const int> stencil, int particle) {
+  return std::find(stencil.begin(), stencil.end(), particle) != stencil.end();
+}
+
+Batch<StableNeoHookean>& soft_phase(PotentialField& field) {
+  return static_cast<Batch<StableNeoHookean>&>(*field.potentials()[0]);
+}
+
+TEST(TwoPhase, WhatBrokeInOnePhaseIsBrokenInTheOther) {
+  Cube cube;
+  auto &soft = soft_phase(cube.field), &stiff = cube.field.batch<StableNeoHookean>();
+  std::vector<bool> left;
+  left.reserve(stiff.num_elements());
+  for (const Tetrahedron& t : stiff.stencils()) left.push_back(!contains(t, 0));
+  const auto num_left = std::count(left.begin(), left.end(), true);
+  ASSERT_TRUE(0 < num_left && num_left < 40);
+  weaken(stiff, [](const Tetrahedron& t) { return contains(t, 0); });
+  const PackedVectors far = cube.stretched(3), near = cube.stretched(1.2);
+  EXPECT_GT(cube.field.evolve(cube.stretched(1.5), 0.01), 0);
+  ASSERT_EQ(enabled(stiff), left);
+  const Real before = cube.field.energy(far), added = cube.field.choose_phase(far);
+  ASSERT_TRUE(cube.field.is_soft());
+  EXPECT_EQ(enabled(soft), left);
+  EXPECT_NEAR(cube.field.energy(far), before + added, 1e-12 * before);
+  for (const Break& event : soft.breaks()) EXPECT_EQ(event.energy, 0) << "it took none along";
+
+  weaken(soft, [](const Tetrahedron& t) { return contains(t, 26); });
+  cube.field.evolve(far, 0.01);
+  for (std::size_t t = 0; t < left.size(); ++t) left[t] = left[t] && !contains(stiff.stencils()[t], 26);
+  ASSERT_EQ(enabled(soft), left);
+  cube.field.choose_phase(near);
+  ASSERT_FALSE(cube.field.is_soft());
+  EXPECT_EQ(enabled(stiff), left);
+}
+
+TEST(TwoPhase, PiecesThatAreWholeAreNearHoweverFarApart) {
+  const TetMesh mesh = make_box({4, 1, 1}, {4, 1, 1});
+  PotentialField field = make_recovering_field(mesh.vertices, mesh.tetrahedra, rubber);
+  PackedVectors x = field.rest_positions();
+  for (int i = 0; i < x.cols(); ++i)
+    if (x(0, i) > 2.5) x(0, i) += 0.5;  // the third cell
+  auto& stiff = field.batch<StableNeoHookean>();
+  stiff.set_breaking({.upper = 0.1});
+  EXPECT_GT(field.evolve(x, 0.01), 0);
+  EXPECT_EQ(field.energy(x), 0);
+  for (int i = 0; i < x.cols(); ++i)
+    if (x(0, i) > 2.5) x(0, i) += 100;
+  EXPECT_EQ(field.choose_phase(x), 0);
+  EXPECT_FALSE(field.is_soft());
+  EXPECT_LT(field.largest_strain(x), 1e-9);
+  x.row(1) *= 3;
+  EXPECT_LT(field.choose_phase(x), 0) << "what is left is far from its rest shape";
+  const PackedVectors back = field.rest_positions();
+  EXPECT_EQ(field.choose_phase(back), 0);
+  EXPECT_FALSE(field.is_soft());
+}
+
+TEST(TwoPhase, ASpringHoldsWhileATetrahedronAroundItIsWhole) {
+  Cube cube;
+  PotentialField field =
+      make_recovering_field(cube.mesh.vertices, cube.mesh.tetrahedra, rubber, ElasticModel::springs_volumes);
+  auto& soft = soft_phase(field);
+  auto& springs = field.batch<Length>();
+  field.choose_phase(cube.stretched(3));
+  ASSERT_TRUE(field.is_soft());
+  weaken(soft, [](const Tetrahedron& t) { return contains(t, 13); });  // the middle
+  field.evolve(cube.stretched(3), 0.01);
+  field.choose_phase(field.rest_positions());
+  ASSERT_FALSE(field.is_soft());
+  int num_broken = 0;
+  for (int e = 0; e < static_cast<int>(springs.num_elements()); ++e) {
+    const Edge& edge = springs.stencils()[e];
+    bool is_held = false;
+    for (const Tetrahedron& t : cube.mesh.tetrahedra)
+      is_held = is_held || (contains(t, edge[0]) && contains(t, edge[1]) && !contains(t, 13));
+    EXPECT_EQ(springs.is_enabled(e), is_held) << e;
+    num_broken += !is_held;
+  }
+  EXPECT_GT(num_broken, 0);
+
+  // A spring that breaks takes all tetrahedra around it along.
+  int one = 0;
+  while (!springs.is_enabled(one)) ++one;
+  const Edge edge = springs.stencils()[one];
+  weaken(springs, [&](const Edge& other) { return other == edge; });
+  PackedVectors x = field.rest_positions();
+  for (const int i : edge) x.col(i) += (x.col(i) - (x.col(edge[0]) + x.col(edge[1])) / 2) * 0.5;
+  field.evolve(x, 0.01);
+  ASSERT_FALSE(springs.is_enabled(one));
+  field.choose_phase(cube.stretched(3));
+  ASSERT_TRUE(field.is_soft());
+  for (int t = 0; t < static_cast<int>(soft.num_elements()); ++t) {
+    const Tetrahedron& corners = soft.stencils()[t];
+    EXPECT_EQ(soft.is_enabled(t), !contains(corners, 13) && !(contains(corners, edge[0]) && contains(corners, edge[1])))
+        << t;
+  }
+}
+
+TEST(TwoPhase, AStateFromBeforeTheBreakIsWhole) {
+  Cube cube;
+  const PackedVectors far = cube.stretched(3);
+  cube.field.batch<StableNeoHookean>().set_breaking({.upper = 0.1});
+  const FieldState whole = cube.field.state();
+  cube.field.evolve(cube.stretched(1.5), 0.01);
+  EXPECT_EQ(cube.field.choose_phase(far), 0);
+  ASSERT_FALSE(cube.field.is_soft()) << "nothing is left that is far";
+  cube.field.set_state(whole);
+  EXPECT_LT(cube.field.choose_phase(far), 0);
+  EXPECT_TRUE(cube.field.is_soft());
+  EXPECT_EQ(soft_phase(cube.field).breaks().size(), 0u);
 }
 
 TEST(TwoPhase, RefusesWhatDoesNotFitTogether) {

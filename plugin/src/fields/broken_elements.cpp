@@ -7,11 +7,10 @@
 namespace penalty {
 namespace {
 
-template <class Visit>
-void for_each_broken(const PotentialField& field, const Visit& visit) {
-  for (const auto& potential : field.potentials())
-    if (const auto* batch = dynamic_cast<const ElementBatch*>(potential.get()); batch && !batch->breaks().empty())
-      visit(*batch);
+// Null: nothing of it ever broke.
+const ElementBatch* with_breaks(const Potential& potential) {
+  const auto* batch = dynamic_cast<const ElementBatch*>(&potential);
+  return batch && !batch->breaks().empty() ? batch : nullptr;
 }
 
 std::vector<int> broken_in(const ElementBatch& batch) {
@@ -27,21 +26,26 @@ std::vector<int> broken_in(const ElementBatch& batch) {
 
 BreakCount count_breaks(const PotentialField& field) {
   BreakCount count;
-  for_each_broken(field, [&](const ElementBatch& batch) {
-    count.ever += batch.breaks().size();
-    for (const Break& event : batch.breaks()) count.now += !batch.is_enabled(event.element);
-  });
+  for (const auto& potential : field.potentials())
+    if (const ElementBatch* batch = with_breaks(*potential)) {
+      count.ever += batch->breaks().size();
+      for (const Break& event : batch->breaks()) count.now += !batch->is_enabled(event.element);
+    }
   return count;
 }
 
-BrokenElements::BrokenElements(const PotentialField& field) : stencils_of_(field.num_particles()) {
-  for_each_broken(field, [&](const ElementBatch& batch) {
-    const std::vector<int> broken = broken_in(batch);
-    num_broken_ += broken.size();
-    batch.visit_elements(field.rest_positions(), [&](const ElementView& element) {
-      if (std::binary_search(broken.begin(), broken.end(), element.number))
-        stencils_of_[element.stencil.front()].emplace_back(element.stencil.begin(), element.stencil.end());
-    });
+BrokenElements::BrokenElements(const PotentialField& field) : BrokenElements(field.num_particles()) {
+  for (const auto& potential : field.potentials()) add(*potential, field.rest_positions());
+}
+
+void BrokenElements::add(const Potential& potential, const Positions& rest) {
+  const ElementBatch* batch = with_breaks(potential);
+  if (!batch) return;
+  const std::vector<int> broken = broken_in(*batch);
+  num_broken_ += broken.size();
+  batch->visit_elements(rest, [&](const ElementView& element) {
+    if (std::binary_search(broken.begin(), broken.end(), element.number))
+      stencils_of_[element.stencil.front()].emplace_back(element.stencil.begin(), element.stencil.end());
   });
 }
 

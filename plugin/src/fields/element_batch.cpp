@@ -169,6 +169,13 @@ void ElementBatch::set_enabled(int element, bool enabled) {
   }
 }
 
+void ElementBatch::break_idle(int element, Real strain) {
+  const std::size_t e = check(element);
+  if (!(stiffnesses_[e] > 0)) return;
+  breaks_.push_back({element, strain, 0});
+  disable(e);
+}
+
 Real ElementBatch::evolve_element(std::size_t e, Real c, Real duration) {
   if (!(stiffnesses_[e] > 0)) return 0;
   Real s = profile(e).strain(c);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "penalty/fields/broken_elements.h"
+
 namespace penalty {
 
 PotentialField::PotentialField(const Eigen::Matrix3Xd& rest_positions) : rest_(pack(rest_positions)) {
@@ -63,7 +65,35 @@ Real PotentialField::largest_strain(const Positions& x) const {
   return largest;
 }
 
+void PotentialField::note_breaks() {
+  const BreakCount count = count_breaks(*this);
+  if (count == noted_) return;
+  noted_ = count;
+  for (std::size_t k = 0; k < switches_.size(); ++k) {
+    BrokenElements broken(count.now > 0 ? num_particles() : 0);
+    for (std::size_t p = 0; p < potentials_.size(); ++p)
+      if (phases_[p].decided_by == static_cast<int>(k)) broken.add(*potentials_[p], rest_);
+    switches_[k].set_broken(broken);
+  }
+}
+
+void PotentialField::break_what_is_lost(int phases, const Positions& x) {
+  if (!switches_[phases].any_broken()) return;
+  for (std::size_t p = 0; p < potentials_.size(); ++p) {
+    auto* batch = dynamic_cast<ElementBatch*>(potentials_[p].get());
+    if (!batch || phases_[p].decided_by != phases || acts(p)) continue;
+    std::vector<std::pair<int, Real>> lost;
+    batch->visit_elements(x, [&](const ElementView& element) {
+      if (element.enabled && switches_[phases].has_lost(element.stencil))
+        lost.emplace_back(element.number, element.strain);
+    });
+    for (const auto& [element, strain] : lost) batch->break_idle(element, strain);
+  }
+}
+
 Real PotentialField::choose_phase(const Positions& x) {
+  if (switches_.empty()) return 0;
+  note_breaks();
   Real added = 0;
   for (std::size_t k = 0; k < switches_.size(); ++k) {
     if (switches_[k].looks_far(x) == switches_[k].is_far) continue;
@@ -74,6 +104,7 @@ Real PotentialField::choose_phase(const Positions& x) {
       return sum;
     };
     const Real before = energy_of_phase();
+    break_what_is_lost(static_cast<int>(k), x);
     switches_[k].is_far = !switches_[k].is_far;
     added += energy_of_phase() - before;
   }
@@ -201,6 +232,7 @@ void PotentialField::get_state(FieldState& state) const {
 }
 
 void PotentialField::set_state(const FieldState& state) {
+  noted_.reset();
   std::span<const Real> values = state.values;
   if (values.size() < switches_.size())
     throw std::invalid_argument("field: the state holds " + std::to_string(values.size()) + " numbers for " +

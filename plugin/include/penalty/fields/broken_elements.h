@@ -6,19 +6,18 @@
 
 namespace penalty {
 
-/// How many elements broke, and how many of them are still out of the field: while neither changes, no more did.
-struct BreakCount {
-  std::size_t ever = 0, now = 0;
-
-  bool operator==(const BreakCount&) const = default;
-};
-
 BreakCount count_breaks(const PotentialField& field);
 
-/// The elements of a field that broke and have not been enabled again.
+/// Elements that broke and have not been enabled again.
 class BrokenElements {
  public:
+  /// Of a body of as many particles: none yet.
+  explicit BrokenElements(int num_particles) : stencils_of_(num_particles) {}
+  /// All of a field.
   explicit BrokenElements(const PotentialField& field);
+
+  /// Adds those of a potential over these particles.
+  void add(const Potential& potential, const Positions& rest);
 
   bool empty() const { return num_broken_ == 0; }
 

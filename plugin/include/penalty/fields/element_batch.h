@@ -13,6 +13,13 @@ struct Break {
   Real energy;  // that it held [J]
 };
 
+/// How many elements broke, and how many of them are still out of the field: while neither changes, no more did.
+struct BreakCount {
+  std::size_t ever = 0, now = 0;
+
+  bool operator==(const BreakCount&) const = default;
+};
+
 /// The elements of a batch, numbered in the order in which they were added, and what may change about each of them
 /// while the simulation runs. Elements start plain; a modifier costs time only in the batch that uses it. Inside a
 /// Bullet world make changes through `AttachedBodies::edit`, which wakes the body.
@@ -46,6 +53,8 @@ class ElementBatch : public Potential {
   void set_breaking(const Breaking& breaking);
   /// Every element that broke, in the order of breaking; a broken element stays disabled until it is enabled again.
   const std::vector<Break>& breaks() const { return breaks_; }
+  /// Breaks an element that holds no energy now; nothing if it is disabled.
+  void break_idle(int element, Real strain);
 
   /// Ratio of damping to stiffness of this element [s], on top of that of the step; zero or positive.
   void set_damping_time(int element, Real time);

@@ -1,6 +1,7 @@
 // The potential of a body: a rest shape and the batches that remember it.
 #pragma once
 #include <memory>
+#include <optional>
 #include <type_traits>
 
 #include "penalty/fields/batch.h"
@@ -83,7 +84,9 @@ class PotentialField {
   bool is_soft() const;
   /// Largest strain of a tetrahedron that decides on a phase, as in PhaseThresholds.
   Real largest_strain(const Positions& x) const;
-  /// Chooses the phase for `x`; returns the energy that this added [J].
+  /// Chooses the phase for `x`; returns the energy that this added [J]. What broke in one phase is broken in the other
+  /// when that comes to act: elements within tetrahedra that decide, all of which have lost an element. Both are then to
+  /// be enabled by who mends them.
   Real choose_phase(const Positions& x);
 
   /// All of them, soft phases first.
@@ -175,11 +178,14 @@ class PotentialField {
   Batch<Kind>& add_elements(std::span<const StencilOf<Kind>> stencils, const std::vector<Real>& stiffnesses,
                             std::string name, const AtRest& at_rest);
   void check_size(const PotentialField& other, const char* what) const;
+  void note_breaks();
+  void break_what_is_lost(int phases, const Positions& x);
 
   PackedVectors rest_;
   std::vector<std::unique_ptr<Potential>> potentials_;
   std::vector<Phase> phases_;  // of each potential
   std::vector<PhaseSwitch> switches_;
+  std::optional<BreakCount> noted_;  // that switches know of
 };
 
 template <ElementKind Kind, class AtRest>
