@@ -152,6 +152,76 @@ TEST_P(JointKinds, ADamperOfAnyStrengthTakesTheSpeed) {
   }
 }
 
+// I w' = -c w
+TEST_P(JointKinds, ADamperOfAnyStrengthTakesTheSpin) {
+  sim.set_gravity({0, 0, 0});
+  for (const Real mass : {0.05, 5.0, 500.0})
+    for (const Real strength : {0.1, 1.0, 10.0, 1e3}) {  // c h / I, h a frame
+      SCOPED_TRACE(std::to_string(strength) + " of " + std::to_string(mass) + " kg");
+      btRigidBody& plate = sim.add_box({0.6, 0.05, 0.6}, mass, {0.5, 0, 0.5});
+      const Real inertia = mass / 3 * (0.05 * 0.05 + 0.6 * 0.6), damping = strength * inertia / frame;
+      auto& joint =
+          add<btGeneric6DofSpring2Constraint>(the_world(), plate, at_point({0.5, 0, 0.5}), at_point({0, 0, 0}));
+      joint.setLimit(3, 1, -1);  // free
+      joint.enableSpring(3, true);
+      joint.setStiffness(3, 0, false);
+      joint.setDamping(3, static_cast<btScalar>(damping), false);
+      plate.setAngularVelocity({1, 0, 0});
+      btSoftBody& rider = add_rider(plate);
+      sim.step(frame, 60);
+      const btVector3 across = plate.getWorldTransform().getBasis() * along_z();
+      const Real angle = inertia / damping * -std::expm1(-damping / inertia);
+      EXPECT_NEAR(std::atan2(-Real(across.y()), Real(across.z())), angle, 0.02 * angle + 0.5 * frame / 8);
+      EXPECT_NEAR(Real(plate.getAngularVelocity().x()), std::exp(-damping / inertia), 2e-3);
+      sim.remove(rider);
+      remove(joint);
+      sim.remove(plate);
+    }
+}
+
+// m v' = m g - c v
+TEST_P(JointKinds, ABodyOnADamperFallsAtTheSpeedWhoseForceIsItsWeight) {
+  for (const Real mass : {0.05, 5.0, 500.0})
+    for (const Real strength : {0.1, 1.0, 10.0, 1e3}) {
+      SCOPED_TRACE(std::to_string(strength) + " of " + std::to_string(mass) + " kg");
+      const Real damping = strength * mass / frame, fastest = mass * g / damping;
+      btRigidBody& plate = sim.add_box({0.6, 0.05, 0.6}, mass, {0.5, 0, 0.5});
+      auto& joint =
+          add<btGeneric6DofSpring2Constraint>(the_world(), plate, at_point({0.5, 0, 0.5}), at_point({0, 0, 0}));
+      leave_free_along_y(joint);
+      joint.enableSpring(1, true);
+      joint.setStiffness(1, 0, false);
+      joint.setDamping(1, static_cast<btScalar>(damping), false);
+      btSoftBody& rider = add_rider(plate);
+      sim.step(frame, 60);
+      EXPECT_NEAR(-Real(plate.getLinearVelocity().y()), -fastest * std::expm1(-damping / mass), 0.01 * fastest);
+      const Real way = fastest * (1 + mass / damping * std::expm1(-damping / mass));
+      EXPECT_NEAR(-center(plate).y(), way, 0.02 * way);
+      sim.remove(rider);
+      remove(joint);
+      sim.remove(plate);
+    }
+}
+
+// x = a exp(-c t / 2 m) (cos w t + c / (2 m w) sin w t), w² = k / m - (c / 2 m)²
+TEST_P(JointKinds, ADamperThatIsWeakerThanItsSpringLetsItSwing) {
+  sim.set_gravity({0, 0, 0});
+  const Real mass = 5, stiffness = 500, damping = 10, start = 0.1;
+  btRigidBody& plate = sim.add_box({0.6, 0.05, 0.6}, mass, {0.5, 0, 0.5});
+  auto& joint =
+      add<btGeneric6DofSpring2Constraint>(the_world(), plate, at_point({0.5 - start, 0, 0.5}), at_point({0, 0, 0}));
+  damp_along_x(joint, damping);
+  joint.setStiffness(0, btScalar(stiffness), false);
+  add_rider(plate);
+  const Real decay = damping / (2 * mass), w = std::sqrt(stiffness / mass - decay * decay);
+  for (int k = 1; k <= 90; ++k) {
+    sim.step(frame);
+    const Real t = k * frame;
+    const Real x = start * std::exp(-decay * t) * (std::cos(w * t) + decay / w * std::sin(w * t));
+    EXPECT_NEAR(center(plate).x() - 0.5 + start, x, 0.05 * start) << k;
+  }
+}
+
 // Far from the centre of a body a damper moves more than its mass.
 TEST_P(JointKinds, ADamperOnALeverTakesEnergyOnly) {
   sim.set_gravity({0, 0, 0});

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "convert.h"
 #include "rigid_bodies.h"
@@ -33,15 +34,6 @@ struct BulletRow {
   }
 };
 using BulletRows = std::array<BulletRow, Joint::most_rows>;
-
-// Impulses of a spring and its damper in a time, of which Bullet's limits are the damper's and the sum of both: of the
-// spring where nothing moves, and then of the damper.
-Real impulse_of_spring(const BulletRow& at_rest) { return Real(at_rest.least) + Real(at_rest.most); }
-Real impulse_of_damper(const BulletRow& row, Real of_spring) {
-  const Real least = row.least, most = row.most;
-  if (of_spring >= 0) return least < 0 ? least : std::max<Real>(most - of_spring, 0);
-  return most > 0 ? most : std::min<Real>(least - of_spring, 0);
-}
 
 // `rate` is one over the time in which errors of position are to go, but for what erp says of that.
 void ask(btTypedConstraint& constraint, int count, Real rate, btScalar erp, const btContactSolverInfo& how,
@@ -90,10 +82,9 @@ struct Ends {
     return (a ? of(*a, row.linear_a, row.angular_a) : 0) + (b ? of(*b, row.linear_b, row.angular_b) : 0);
   }
   /// Of unit velocities along the row.
-  Real speed_along(const JointRow& row) const {
-    return sum(row, [](const RigidBody&, const Vector3& linear, const Vector3& angular) {
-      return linear.squaredNorm() + angular.squaredNorm();
-    });
+  Real speed_along(const BulletRow& row) const {
+    return Real((a ? row.linear_a.length2() + row.angular_a.length2() : 0) +
+                (b ? row.linear_b.length2() + row.angular_b.length2() : 0));
   }
   Real mobility(const JointRow& row) const {
     return sum(row, [](const RigidBody& body, const Vector3& linear, const Vector3& angular) {
@@ -124,6 +115,32 @@ class MovedEnds {
   btRigidBody &a_, &b_;
   std::array<btVector3, 4> before_;
 };
+
+struct Spring {
+  Real force, damping;  // of the spring now [N, N m], of its damper per speed along the row
+};
+
+// Limits of a spring and its damper are the damper's impulse in a time of h and the sum of both: the spring's alone where
+// nothing moves, and the damper's is the other one where it acts against the spring. Those of a motor are the same both
+// ways, whatever moves.
+std::optional<Spring> spring_of(btTypedConstraint& constraint, int count, int number, const BulletRow& asked,
+                                const Ends& ends, Real h, const btContactSolverInfo& how) {
+  if (!asked.has_least() || !asked.has_most()) return std::nullopt;
+  const btVector3 none(0, 0, 0);
+  MovedEnds moved(constraint);
+  BulletRows tried;
+  moved.set({none, none, none, none});
+  ask(constraint, count, 1 / h, 1, how, tried);
+  const bool is_spring = tried[number].is_force();
+  const Real impulse = is_spring ? Real(tried[number].least) + Real(tried[number].most) : 0;
+  const btScalar way = impulse < 0 ? -1 : 1;
+  moved.set({ends.a ? way * asked.linear_a : none, ends.a ? way * asked.angular_a : none,
+             ends.b ? way * asked.linear_b : none, ends.b ? way * asked.angular_b : none});
+  ask(constraint, count, 1 / h, 1, how, tried);
+  const BulletRow& damped = tried[number];
+  if (!is_spring && !damped.is_force()) return std::nullopt;
+  return Spring{impulse / h, Real(impulse < 0 ? damped.most : -damped.least) / (h * ends.speed_along(asked))};
+}
 
 }  // namespace
 
@@ -173,7 +190,6 @@ void JointRows::add_rows(std::span<const RigidBody> bodies, Real h, Real since, 
 // velocity that there will be, however strong they are:  impulse = since (force of the spring - d u).
 void JointRows::add_rows_of(int number, std::span<const RigidBody> bodies, Real h, Real since,
                             std::vector<JointRow>& rows) {
-  const btVector3 none(0, 0, 0);
   const HeldJoint& held = joints_[number];
   btTypedConstraint& constraint = *held.constraint;
   const int count = count_rows(constraint);
@@ -193,21 +209,12 @@ void JointRows::add_rows_of(int number, std::span<const RigidBody> bodies, Real 
                  .linear_b = to_vector(asked.linear_b),
                  .angular_b = to_vector(asked.angular_b)};
     if (ends.a && ends.b) make_one_line(row, from_b_to_a);
-    if (asked.is_force()) {
-      MovedEnds moved(constraint);
-      BulletRows tried;
-      moved.set({none, none, none, none});
-      ask(constraint, count, 1 / h, 1, info_, tried);
-      const Real of_spring = impulse_of_spring(tried[k]);
-      moved.set({ends.a ? asked.linear_a : none, ends.a ? asked.angular_a : none, ends.b ? asked.linear_b : none,
-                 ends.b ? asked.angular_b : none});
-      ask(constraint, count, 1 / h, 1, info_, tried);
-      const Real damping = -impulse_of_damper(tried[k], of_spring) / (h * ends.speed_along(row));  // d
-      if (since > 0 && damping > 0) {
-        row.softness = 1 / (since * damping);
-        row.wanted = of_spring / (h * damping);
+    if (const auto spring = spring_of(constraint, count, k, asked, ends, h, info_)) {
+      if (since > 0 && spring->damping > 0) {
+        row.softness = 1 / (since * spring->damping);
+        row.wanted = spring->force / spring->damping;
       } else {
-        row.least = row.most = since / h * of_spring;
+        row.least = row.most = since * spring->force;
       }
     } else if (asked.is_soft() || (asked.has_least() && asked.has_most())) {
       const BulletRow& in_step = as_bullet[k];
