@@ -1,5 +1,6 @@
 #include "penalty/fields/batch.h"
 
+#include "../math/processors.h"
 #include "penalty/fields/batch_loops.h"
 #include "row_kernels.h"
 
@@ -7,33 +8,23 @@ namespace penalty {
 namespace detail {
 namespace {
 
-// GCC compiles one function twice and the loader picks: fused multiply-add and three-operand instructions are worth a
-// fifth of the time. Elsewhere there is only the plain one.
 template <ElementKind Kind>
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-Real add_forces_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
-                           std::size_t size, const Real* x, Real* f) {
+PENALTY_TARGET_CLONES Real add_forces_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds,
+                                                 const Real* stiffnesses, std::size_t size, const Real* x, Real* f) {
   return add_element_forces(stencils, kinds, stiffnesses, size, x, f);
 }
 
 template <ElementKind Kind>
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-void add_forces_only_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
-                                std::size_t size, const Real* x, Real* f) {
+PENALTY_TARGET_CLONES void add_forces_only_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds,
+                                                      const Real* stiffnesses, std::size_t size, const Real* x,
+                                                      Real* f) {
   add_element_forces_only(stencils, kinds, stiffnesses, size, x, f);
 }
 
 template <ElementKind Kind>
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-void add_modes_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds, const Real* stiffnesses,
-                          const Real* times, std::size_t size, const Real* x, Real time, Real duration,
-                          DampingModes& modes) {
+PENALTY_TARGET_CLONES void add_modes_one_by_one(const StencilOf<Kind>* stencils, const Kind* kinds,
+                                                const Real* stiffnesses, const Real* times, std::size_t size,
+                                                const Real* x, Real time, Real duration, DampingModes& modes) {
   add_element_modes(stencils, kinds, stiffnesses, times, size, x, time, duration, modes);
 }
 

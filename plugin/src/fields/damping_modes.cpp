@@ -88,7 +88,7 @@ void DampingModes::end() {
                              .begins = blocks_.product_begins.data(),
                              .products = blocks_.products.data(),
                              .gradients = gradients_.data()};
-#if defined(__x86_64__) && defined(__GNUC__)
+#ifdef PENALTY_HAS_AVX2
   if (rows::are_supported()) return rows::sum_blocks(from, blocks_.columns.size(), blocks_.values.data());
 #endif
   sum_blocks(from, blocks_.columns.size(), blocks_.values.data());
@@ -99,7 +99,7 @@ void DampingModes::add_product(const Vectors& v, Forces out) const {
                              .begins = blocks_.begins.data(),
                              .columns = blocks_.columns.data(),
                              .values = blocks_.values.data()};
-#if defined(__x86_64__) && defined(__GNUC__)
+#ifdef PENALTY_HAS_AVX2
   if (rows::are_supported())
     rows::add_block_products(blocks, v.data(), out.data());
   else

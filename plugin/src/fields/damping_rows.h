@@ -72,13 +72,8 @@ inline void add_block_products(const DampingBlocks& blocks, const Real* v, Real*
 
 }  // namespace penalty
 
-#if defined(__x86_64__) && defined(__GNUC__)
-#ifdef __clang__
-#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
-#else
-#pragma GCC push_options
-#pragma GCC target("avx2,fma")
-#endif
+#ifdef PENALTY_HAS_AVX2
+PENALTY_BEGIN_AVX2
 
 namespace penalty::rows {
 
@@ -120,9 +115,5 @@ inline void add_block_products(const DampingBlocks& blocks, const Real* v, Real*
 
 }  // namespace penalty::rows
 
-#ifdef __clang__
-#pragma clang attribute pop
-#else
-#pragma GCC pop_options
-#endif
+PENALTY_END_AVX2
 #endif

@@ -6,13 +6,8 @@
 #include "penalty/kinds/kinds.h"
 #include "rows.h"
 
-#if defined(__x86_64__) && defined(__GNUC__)
-#ifdef __clang__
-#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
-#else
-#pragma GCC push_options
-#pragma GCC target("avx2,fma")
-#endif
+#ifdef PENALTY_HAS_AVX2
+PENALTY_BEGIN_AVX2
 
 namespace penalty::rows {
 
@@ -190,11 +185,7 @@ Real energy(const Stencil* stencils, const Kind* kinds, const Real* stiffnesses,
 
 }  // namespace penalty::rows
 
-#ifdef __clang__
-#pragma clang attribute pop
-#else
-#pragma GCC pop_options
-#endif
+PENALTY_END_AVX2
 
 namespace penalty {
 

@@ -3,9 +3,10 @@
 #pragma once
 #include <cstddef>
 
+#include "../math/processors.h"
 #include "penalty/math/types.h"
 
-#if defined(__x86_64__) && defined(__GNUC__)
+#ifdef PENALTY_HAS_AVX2
 #include <immintrin.h>
 
 namespace penalty::rows {
@@ -18,12 +19,7 @@ inline bool are_supported() {
 
 }  // namespace penalty::rows
 
-#ifdef __clang__
-#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
-#else
-#pragma GCC push_options
-#pragma GCC target("avx2,fma")
-#endif
+PENALTY_BEGIN_AVX2
 
 namespace penalty::rows {
 
@@ -84,9 +80,5 @@ template <std::size_t apart>
 
 }  // namespace penalty::rows
 
-#ifdef __clang__
-#pragma clang attribute pop
-#else
-#pragma GCC pop_options
-#endif
+PENALTY_END_AVX2
 #endif

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../math/processors.h"
 #include "../math/quadruple.h"
 #include "penalty/stepping/stable_step.h"
 #include "rigid_state.h"
@@ -32,9 +33,7 @@ int stages_to_reach(Real z) {
 
 // change before <- a change + b change before - c M^-1 product, what will be the change; product <- 0; now <- the
 // velocity with that, less the rigid one: linear + angular x (position - that of the first).
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
+PENALTY_TARGET_CLONES
 void end_stage(const Particles& particles, const Vector3& linear, const Vector3& angular, Real a, Real b, Real c,
                const Real* change, Real* change_before, Real* product, Real* now) {
   const Real* v = particles.velocities.data();

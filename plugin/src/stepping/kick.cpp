@@ -1,5 +1,6 @@
 #include "kick.h"
 
+#include "../math/processors.h"
 #include "../math/quadruple.h"
 
 namespace penalty {
@@ -8,11 +9,9 @@ namespace {
 // Whole columns, whose last number stays zero: that takes fewer instructions than three numbers. Compiled twice, as the
 // loops over the elements are.
 template <bool drifts>
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
-void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const Vector3& acceleration, Real kick_time,
-                  [[maybe_unused]] Real drift_time, Real* v, [[maybe_unused]] Real* x) {
+PENALTY_TARGET_CLONES void kick_columns(const std::vector<Real>& inverse_masses, const Real* f,
+                                        const Vector3& acceleration, Real kick_time, [[maybe_unused]] Real drift_time,
+                                        Real* v, [[maybe_unused]] Real* x) {
   const Quadruple dv = {kick_time * acceleration[0], kick_time * acceleration[1], kick_time * acceleration[2], 0};
   for (const Real inverse_mass : inverse_masses) {
     Quadruple velocity, force;
@@ -33,9 +32,7 @@ void kick_columns(const std::vector<Real>& inverse_masses, const Real* f, const 
   }
 }
 
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
-[[gnu::target_clones("arch=x86-64-v3", "default")]]
-#endif
+PENALTY_TARGET_CLONES
 void drift_columns(Eigen::Index size, Real time, const Real* v, Real* x) {
   Quadruple place, velocity;
   for (Eigen::Index i = 0; i < 4 * size; i += 4) {
