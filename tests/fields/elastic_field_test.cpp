@@ -274,5 +274,15 @@ TEST(ElasticField, RefusesWhatItsMaterialRefuses) {
             "length 0: stiffness is -1 J, must be positive and finite");
 }
 
+TEST(ElasticField, NamesTheTetrahedronThatIsFlat) {
+  TetMesh mesh = cube(1);
+  mesh.tetrahedra[3] = {0, 1, 2, 1};
+  for (const ElasticModel model :
+       {ElasticModel::springs_volumes, ElasticModel::springs_areas_volumes, ElasticModel::neo_hookean})
+    EXPECT_EQ(complaint<std::invalid_argument>(
+                  [&] { make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.poisson = 0.4}, model); }),
+              "elastic field: tetrahedron 3 has no volume at rest");
+}
+
 }  // namespace
 }  // namespace penalty::testing

@@ -50,7 +50,11 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
   material.check(model);
   PotentialField field(vertices);
   std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
-  for (Real& volume : volumes) volume = std::abs(volume);
+  for (std::size_t t = 0; t < volumes.size(); ++t) {
+    volumes[t] = std::abs(volumes[t]);
+    if (!(volumes[t] > 0))
+      throw std::invalid_argument("elastic field: tetrahedron " + std::to_string(t) + " has no volume at rest");
+  }
   if (model == ElasticModel::neo_hookean) {
     field.add(StableNeoHookean::with_ratio(material.lame_lambda() / material.lame_mu()), tetrahedra,
               scaled(volumes, material.lame_mu()));

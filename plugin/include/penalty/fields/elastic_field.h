@@ -11,7 +11,8 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
                                   Real stiffness);
 
 /// Elements of `model` with stiffnesses that stand for a material (see `Material`), whatever the mesh. At its least
-/// Poisson ratio the volume term of a model of springs vanishes and is left out.
+/// Poisson ratio the volume term of a model of springs vanishes and is left out. Throws std::invalid_argument that names
+/// the number of `material` that is out of range, or the tetrahedron that is flat.
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                   const Material& material, ElasticModel model = ElasticModel::springs_volumes);
 
