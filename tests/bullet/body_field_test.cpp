@@ -241,18 +241,6 @@ TEST_P(BodyField, OfASolidWithASkinAndATailIsAllOfThem) {
   EXPECT_EQ(field.num_elements(), solid + 1 + 3 + 1);  // a link, and a triangle with its edges and its area
 }
 
-TEST_P(BodyField, SolidsWithoutFacesAreTouchedWhereTheirTetrahedraEnd) {
-  sim.set_gravity({0, -g, 0});
-  btSoftBody& body = sim.add(tetgen(sim.info(), make_box({1, 1, 1}, {1, 1, 1})));
-  ASSERT_EQ(body.m_faces.size(), 0);
-  body.getCollisionShape()->setMargin(btScalar(0.01));
-  for (int i = 0; i < body.m_nodes.size(); ++i) body.setMass(i, 0);
-  sim.penalty().attach(body, make_field(body, {}));
-  const btRigidBody& ball = sim.add_rigid(std::make_unique<btSphereShape>(btScalar(0.1)), 1, {0.75, 1.2, 0.55});
-  sim.step(frame, 120);
-  EXPECT_NEAR(to_vector(ball.getWorldTransform().getOrigin()).y(), 1.1, 0.02);
-}
-
 std::string refusal(const btSoftBody& body, const BodyFieldOptions& options = {}, const Material& material = {}) {
   try {
     make_field(body, material, options);
@@ -260,6 +248,31 @@ std::string refusal(const btSoftBody& body, const BodyFieldOptions& options = {}
     return error.what();
   }
   return "";
+}
+
+// A ball smaller than the faces of a cube falls on one.
+TEST_P(BodyField, SolidsWithoutFacesAreTouchedWhereTheirTetrahedraEnd) {
+  TetMesh cube = make_box({1, 1, 1}, {1, 1, 1});
+  for (const bool tetrahedra_are_left_behind : {false, true}) {
+    SCOPED_TRACE(tetrahedra_are_left_behind);
+    Simulation own(GetParam());
+    own.set_gravity({0, -g, 0});
+    btSoftBody& body = own.add(tetgen(own.info(), cube));
+    ASSERT_EQ(body.m_faces.size(), 0);
+    if (tetrahedra_are_left_behind) {
+      const btSoftBody::Node* const first = &body.m_nodes[0];
+      while (first == &body.m_nodes[0]) body.appendNode({5, 5, 5}, 1);
+      cube.vertices.conservativeResize(3, body.m_nodes.size());
+      cube.vertices.rightCols(body.m_nodes.size() - 8).setConstant(5);
+      EXPECT_NE(refusal(body), "");
+    }
+    body.getCollisionShape()->setMargin(btScalar(0.01));
+    for (int i = 0; i < body.m_nodes.size(); ++i) body.setMass(i, 0);
+    own.penalty().attach(body, make_elastic_field(cube.vertices, cube.tetrahedra, Material{}));
+    const btRigidBody& ball = own.add_rigid(std::make_unique<btSphereShape>(btScalar(0.1)), 1, {0.75, 1.2, 0.55});
+    own.step(frame, 120);
+    EXPECT_NEAR(to_vector(ball.getWorldTransform().getOrigin()).y(), 1.1, 0.02);
+  }
 }
 
 TEST_P(BodyField, NamesWhatIsWrong) {
@@ -274,6 +287,11 @@ TEST_P(BodyField, NamesWhatIsWrong) {
             "material: Poisson's ratio is 0.2, must be in [0.333333, 0.5) for sheets");
   EXPECT_EQ(refusal(*rope(sim.info()), {}, {.young = 0}),
             "material: Young's modulus is 0, must be positive and finite [Pa]");
+  EXPECT_EQ(refusal(*tetgen(sim.info(), make_box({1, 1, 1}, {1, 1, 1})), {}, {.poisson = 0.6}),
+            "material: Poisson's ratio is 0.6, must be in [0, 0.5) for a soft body");
+  TetMesh flat = make_box({1, 1, 1}, {1, 1, 1});
+  flat.vertices.row(1).setZero();
+  EXPECT_EQ(refusal(*tetgen(sim.info(), flat)), "elastic field: tetrahedron 0 has no volume at rest");
   auto held = rope(sim.info());
   for (int i = 0; i < held->m_nodes.size(); ++i) held->setMass(i, 0);
   EXPECT_EQ(refusal(*held),

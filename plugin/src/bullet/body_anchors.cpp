@@ -8,6 +8,7 @@
 
 #include "convert.h"
 #include "held_bodies.h"
+#include "nodes.h"
 #include "world_island.h"
 #include "world_objects.h"
 
@@ -31,13 +32,13 @@ const char* read_anchors(HeldBody& held, const WorldObjects& objects) {
   held.anchors.clear();
   const auto add = [&](const btSoftBody::Node* node, const btCollisionObject* object, const btVector3& local,
                        Real influence) -> const char* {
-    const auto number = node - &body.m_nodes[0];
-    if (number < 0 || number >= body.m_nodes.size()) return "an anchor is of no node of it: append it again";
+    const int number = index_of(body, node);
+    if (number < 0) return "an anchor is of no node of it: append it again";
     if (!objects.contain(object)) return "what it is anchored to has left the world: remove the anchor, or put it back";
     if (!std::isfinite(local.length2()) || !std::isfinite(influence)) return "an anchor is not finite";
     if (influence > 0)
-      held.anchors.push_back({static_cast<int>(number), const_cast<btCollisionObject*>(object), to_vector(local),
-                              std::min<Real>(influence, 1)});
+      held.anchors.push_back(
+          {number, const_cast<btCollisionObject*>(object), to_vector(local), std::min<Real>(influence, 1)});
     return nullptr;
   };
   for (int k = 0; k < body.m_anchors.size(); ++k) {

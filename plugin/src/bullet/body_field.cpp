@@ -6,6 +6,7 @@
 #include <string>
 
 #include "convert.h"
+#include "nodes.h"
 #include "penalty/bullet/soft_body.h"
 #include "penalty/fields/batch_loops.h"
 #include "penalty/math/text.h"
@@ -70,9 +71,8 @@ class BodyParts {
   std::array<int, N> stencil_of(const Element& element, const char* name, int index) const {
     std::array<int, N> stencil;
     for (std::size_t k = 0; k < N; ++k) {
-      const std::ptrdiff_t node = element.m_n[k] - &body_.m_nodes[0];
-      if (node < 0 || node >= body_.m_nodes.size()) fail(name, index, "joins a node that is not of this body");
-      stencil[k] = static_cast<int>(node);
+      stencil[k] = index_of(body_, element.m_n[k]);
+      if (stencil[k] < 0) fail(name, index, "joins a node that is not of this body");
     }
     return stencil;
   }
@@ -83,19 +83,17 @@ class BodyParts {
   }
 
   void take_tetrahedra() {
-    for (int t = 0; t < body_.m_tetras.size(); ++t) {
-      Tetrahedron tetrahedron = stencil_of<4>(body_.m_tetras[t], "tetrahedron", t);
-      if (signed_volumes(positions_, std::span(&tetrahedron, 1))[0] < 0) std::swap(tetrahedron[2], tetrahedron[3]);
-      tetrahedra_.push_back(tetrahedron);
-    }
+    for (int t = 0; t < body_.m_tetras.size(); ++t)
+      tetrahedra_.push_back(stencil_of<4>(body_.m_tetras[t], "tetrahedron", t));
+    orient(positions_, tetrahedra_);
   }
 
   void take_faces() {
-    std::vector<Triangle> seen = faces_of(tetrahedra_);
+    const std::vector<Triangle> sides = faces_of(tetrahedra_);
     for (int f = 0; f < body_.m_faces.size(); ++f) {
       const Triangle face = stencil_of<3>(body_.m_faces[f], "face", f);
-      const bool is_side = contains(seen, face);
-      if (!is_side && areas_of(positions_, std::span(&face, 1))[0] > 0) triangles_.push_back(face);
+      const bool is_flat = areas_of(positions_, std::span(&face, 1))[0] == 0;
+      if (!is_flat && !contains(sides, face)) triangles_.push_back(face);
     }
     drop_doubles(triangles_, [](const Triangle& triangle) { return in_order(triangle); });
   }
@@ -157,8 +155,8 @@ Real size_of(const std::optional<Real>& said, const char* name, Real mass, Real 
 }  // namespace
 
 PotentialField make_field(const btSoftBody& body, const Material& material, const BodyFieldOptions& options) {
+  material.check(0, "a soft body");
   const BodyParts parts(body);
-  material.check(0, "links");
   PotentialField field = parts.tetrahedra().empty()
                              ? PotentialField(parts.positions())
                              : make_elastic_field(parts.positions(), parts.tetrahedra(), material, options.model);

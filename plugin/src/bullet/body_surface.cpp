@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "held_bodies.h"
+#include "nodes.h"
 #include "penalty/mesh/embed.h"
 #include "surfaces.h"
 
@@ -40,7 +41,7 @@ std::shared_ptr<ContactSurface> make_surface(const HeldBody& held) {
   std::vector<int> point_of(body.m_nodes.size(), -1);
   std::vector<WeightedPoint> points;
   const auto point_at = [&](const btSoftBody::Node* node) {
-    const auto i = static_cast<int>(node - &body.m_nodes[0]);
+    const int i = index_of(body, node);
     if (point_of[i] < 0) {
       point_of[i] = static_cast<int>(points.size());
       points.push_back(WeightedPoint::at_particle(i));

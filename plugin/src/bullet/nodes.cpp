@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
@@ -26,6 +27,16 @@ void check(const btVector3& v, int node, const std::string& what) {
 }
 
 }  // namespace
+
+int index_of(const btSoftBody& body, const btSoftBody::Node* node) {
+  if (body.m_nodes.size() == 0) return -1;
+  // A difference of pointers into different arrays is no number of nodes.
+  const auto first = reinterpret_cast<std::uintptr_t>(&body.m_nodes[0]);
+  const std::uintptr_t distance = reinterpret_cast<std::uintptr_t>(node) - first;
+  const std::uintptr_t index = distance / sizeof(btSoftBody::Node);
+  const bool is_one = distance % sizeof(btSoftBody::Node) == 0 && index < static_cast<std::size_t>(body.m_nodes.size());
+  return is_one ? static_cast<int>(index) : -1;
+}
 
 Nodes::Nodes(btSoftBody& body, Particles& particles) : body_(&body) {
   const int size = body.m_nodes.size();

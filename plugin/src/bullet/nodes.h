@@ -8,6 +8,10 @@
 
 namespace penalty {
 
+/// Index of a node, -1 if the body has none there: Bullet leaves tetrahedra and anchors of the deformable world behind when
+/// it moves the nodes of a body to append one.
+int index_of(const btSoftBody& body, const btSoftBody::Node* node);
+
 /// What an application changed since the nodes were last written.
 struct NodeChanges {
   bool moved = false;    // positions

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "convert.h"
+#include "nodes.h"
 #include "penalty/fields/batch.h"
 #include "penalty/kinds/stable_neo_hookean.h"
 #include "penalty/kinds/tetrahedron_volume.h"
@@ -19,7 +20,7 @@ using Node = btSoftBody::Node;
 template <std::size_t N>
 std::array<int, N> numbers_of(const btSoftBody& body, Node* const (&nodes)[N]) {
   std::array<int, N> numbers;
-  for (std::size_t k = 0; k < N; ++k) numbers[k] = static_cast<int>(nodes[k] - &body.m_nodes[0]);
+  for (std::size_t k = 0; k < N; ++k) numbers[k] = index_of(body, nodes[k]);
   return numbers;
 }
 
@@ -62,7 +63,11 @@ void append_face(btSoftBody& body, const Triangle& corners, const PackedVectors&
 std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialField& field) {
   std::vector<Tetrahedron> tetrahedra;
   tetrahedra.reserve(body.m_tetras.size());
-  for (int k = 0; k < body.m_tetras.size(); ++k) tetrahedra.push_back(numbers_of(body, body.m_tetras[k].m_n));
+  for (int k = 0; k < body.m_tetras.size(); ++k) {
+    const Tetrahedron t = numbers_of(body, body.m_tetras[k].m_n);
+    if (std::all_of(t.begin(), t.end(), [](int node) { return node >= 0; })) tetrahedra.push_back(t);
+  }
+  const bool has_own = !tetrahedra.empty();
   std::set<Tetrahedron> known;
   const auto add = [&](const auto* batch) {
     if (!batch) return;
@@ -70,13 +75,11 @@ std::vector<Tetrahedron> tetrahedra_of(const btSoftBody& body, const PotentialFi
       if (known.insert(sorted(t)).second) tetrahedra.push_back(t);
   };
   for (const auto& potential : field.potentials()) {
-    if (body.m_tetras.size() > 0) break;
+    if (has_own) break;
     add(dynamic_cast<const Batch<TetrahedronVolume>*>(potential.get()));
     add(dynamic_cast<const Batch<StableNeoHookean>*>(potential.get()));
   }
-  const std::vector<Real> volumes = signed_volumes(field.rest_positions().topRows<3>(), tetrahedra);
-  for (std::size_t t = 0; t < tetrahedra.size(); ++t)
-    if (volumes[t] < 0) std::swap(tetrahedra[t][2], tetrahedra[t][3]);
+  orient(field.rest_positions().topRows<3>(), tetrahedra);
   return tetrahedra;
 }
 

@@ -91,6 +91,12 @@ std::vector<Real> signed_volumes(const Eigen::Matrix3Xd& vertices, std::span<con
   return volumes;
 }
 
+void orient(const Eigen::Matrix3Xd& vertices, std::span<Tetrahedron> tetrahedra) {
+  const std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
+  for (std::size_t t = 0; t < tetrahedra.size(); ++t)
+    if (volumes[t] < 0) std::swap(tetrahedra[t][2], tetrahedra[t][3]);
+}
+
 std::vector<Real> edge_volume_shares(std::span<const Edge> edges, std::span<const Tetrahedron> tetrahedra,
                                      std::span<const Real> volumes) {
   std::vector<Real> shares(edges.size(), 0);

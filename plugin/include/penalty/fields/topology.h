@@ -29,6 +29,9 @@ std::vector<Triangle> faces_of(std::span<const Tetrahedron> tetrahedra);
 /// Signed volume of each tetrahedron [m^3]. `vertices` is 3 x V [m].
 std::vector<Real> signed_volumes(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra);
 
+/// Exchanges two corners of those of negative volume, so that all have a positive one.
+void orient(const Eigen::Matrix3Xd& vertices, std::span<Tetrahedron> tetrahedra);
+
 /// v_e = sum of V_t / 6 over the tetrahedra t around edge e [m^3], one per edge of `edges_of(tetrahedra)`: the shares
 /// of all edges add up to the volume of the mesh.
 std::vector<Real> edge_volume_shares(std::span<const Edge> edges, std::span<const Tetrahedron> tetrahedra,
