@@ -1,7 +1,5 @@
 // Thin sheets of the scenes: cloth, the skin of a balloon, foil.
 #pragma once
-#include <string_view>
-
 #include "penalty/fields/elastic_field.h"
 #include "penalty/mesh/triangle_surface.h"
 #include "scenes/body_mesh.h"
