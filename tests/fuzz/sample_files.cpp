@@ -8,7 +8,14 @@ std::vector<std::string> sample_files(FileFormat format) {
     case FileFormat::vtk:
       return {vtk_ascii, vtk_offsets, vtk_binary(), vtk_binary_offsets()};
     case FileFormat::gmsh:
-      return {gmsh_2, gmsh_41};
+      return {gmsh_2,
+              gmsh_41,
+              gmsh_file("1", GmshNumbers::text),
+              gmsh_file("2.2", GmshNumbers::binary),
+              gmsh_file("4", GmshNumbers::text),
+              gmsh_file("4", GmshNumbers::swapped),
+              gmsh_file("4.1", GmshNumbers::binary),
+              gmsh_prisms};
     case FileFormat::tetgen:
       return {tetgen_node + std::string(tetgen_cut) + tetgen_ele};
     case FileFormat::ply:

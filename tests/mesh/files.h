@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "penalty/mesh/tet_mesh.h"
 
@@ -206,6 +207,112 @@ inline const std::string gmsh_41 =
     "2 1 2 3 8\n"           // 28
     "3 1 3 2 9\n"           // 29
     "$EndElements\n";       // 30
+
+/// How numbers of a Gmsh file are written.
+enum class GmshNumbers { text, binary, swapped };
+
+/// The mesh, between a point, a triangle and a line that are none of it, in the layout of a Gmsh version: "1", "2.2",
+/// "4", "4.1". Its nodes have the numbers 11 to 15.
+inline std::string gmsh_file(const std::string& version, GmshNumbers numbers) {
+  const bool is_text = numbers == GmshNumbers::text, is_old = version == "1", is_4 = version[0] == '4';
+  const bool is_41 = version == "4.1";
+  const bool is_little = (std::endian::native == std::endian::little) == (numbers == GmshNumbers::binary);
+  std::string file;
+  const auto put = [&](auto value) {
+    if (is_text) {
+      file += std::to_string(value) + " ";
+    } else {
+      std::string bytes = big_endian(value);
+      if (is_little) bytes.assign(bytes.rbegin(), bytes.rend());
+      file += bytes;
+    }
+  };
+  const auto put_int = [&](int value) { put(std::int32_t{value}); };
+  const auto put_size = [&](int value) { put(std::int64_t{value}); };
+  const auto put_tag = [&](int value) { is_41 ? put_size(value) : put_int(value); };
+  const auto end_line = [&] { file += is_text ? "\n" : ""; };
+  const auto end_section = [&](const char* name) { file += std::string(is_text ? "" : "\n") + name + "\n"; };
+  const TetMesh mesh = two_tetrahedra();
+  struct Element {
+    int type;
+    std::vector<int> nodes;
+  };
+  const std::vector<Element> elements{
+      {15, {11}}, {2, {11, 12, 13}}, {4, {11, 12, 13, 14}}, {4, {11, 13, 12, 15}}, {1, {14, 15}}};
+
+  if (!is_old) {
+    file = "$MeshFormat\n" + version + (is_text ? " 0 8\n" : " 1 8\n");
+    if (!is_text) put_int(1), file += "\n";
+    file += "$EndMeshFormat\n";
+  }
+  file += is_old ? "$NOD\n" : "$Nodes\n";
+  const auto put_place = [&](int v) {
+    for (int axis = 0; axis < 3; ++axis) put(mesh.vertices(axis, v));
+  };
+  if (is_4) {
+    put_size(2), put_size(5);
+    if (is_41) put_size(11), put_size(15);
+    end_line();
+    for (const int block : {0, 1}) {  // on a face, with two parameters each; in a volume
+      const int dimension = block == 0 ? 2 : 3, first = block == 0 ? 0 : 3, end = block == 0 ? 3 : 5;
+      put_int(is_41 ? dimension : 7), put_int(is_41 ? 7 : dimension), put_int(block == 0 ? 1 : 0),
+          put_size(end - first);
+      end_line();
+      if (is_41)
+        for (int v = first; v < end; ++v) put_size(11 + v), end_line();
+      for (int v = first; v < end; ++v) {
+        if (!is_41) put_int(11 + v);
+        put_place(v);
+        if (block == 0) put(0.25), put(0.75);
+        end_line();
+      }
+    }
+  } else {
+    file += "5\n";
+    for (int v = 0; v < 5; ++v) put_int(11 + v), put_place(v), end_line();
+  }
+  end_section(is_old ? "$ENDNOD" : "$EndNodes");
+  file += is_old ? "$ELM\n" : "$Elements\n";
+  if (is_4) {
+    put_size(static_cast<int>(elements.size())), put_size(static_cast<int>(elements.size()));
+    if (is_41) put_size(1), put_size(static_cast<int>(elements.size()));
+    end_line();
+  } else {
+    file += std::to_string(elements.size()) + "\n";
+  }
+  int number = 0;
+  for (const auto& [type, nodes] : elements) {
+    ++number;
+    if (is_4) {
+      put_int(3), put_int(7), put_int(type), put_size(1), end_line();
+      put_tag(number);
+    } else if (is_text) {
+      put_int(number), put_int(type);
+      if (is_old)
+        put_int(1), put_int(7), put_int(static_cast<int>(nodes.size()));
+      else
+        put_int(2), put_int(1), put_int(7);
+    } else {
+      put_int(type), put_int(1), put_int(2), put_int(number), put_int(1), put_int(7);
+    }
+    for (const int node : nodes) put_tag(node);
+    end_line();
+  }
+  end_section(is_old ? "$ENDELM" : "$EndElements");
+  return file;
+}
+
+/// A box of 2 x 3 x 5 m: two prisms.
+inline const std::string gmsh_prisms =
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    "$Nodes\n8\n"
+    "1 0 0 0\n2 2 0 0\n3 2 3 0\n4 0 3 0\n"
+    "5 0 0 5\n6 2 0 5\n7 2 3 5\n8 0 3 5\n"
+    "$EndNodes\n"
+    "$Elements\n2\n"
+    "1 6 0 1 2 3 5 6 7\n"
+    "2 6 0 1 3 4 5 7 8\n"
+    "$EndElements\n";
 
 inline const std::string tetgen_node =
     "# points\n"                          // 1

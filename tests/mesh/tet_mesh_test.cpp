@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "files.h"
+#include "penalty/mesh/builders.h"
 
 namespace penalty::testing {
 namespace {
@@ -22,6 +23,43 @@ TEST(Repair, TurnsLeftHandedTetrahedra) {
   repair(mesh);
   EXPECT_EQ(mesh.repairs.reoriented, 1);
   for (Real v : signed_volumes(mesh.vertices, mesh.tetrahedra)) EXPECT_DOUBLE_EQ(v, 1.0 / 6);
+}
+
+// Two rows of cubes, tetrahedra each, that meet in a plane without a common vertex.
+TEST(Repair, MergesTheSeamOfAMeshFromAFile) {
+  const TetMesh half = make_box({1, 1, 1}, {2, 2, 2});
+  const Eigen::Index size = half.vertices.cols();
+  TetMesh mesh = half;
+  mesh.vertices.conservativeResize(3, 2 * size);
+  mesh.vertices.rightCols(size) = half.vertices;
+  mesh.vertices.rightCols(size).row(0) *= -1;
+  for (Tetrahedron t : half.tetrahedra) {
+    for (int& v : t) v += static_cast<int>(size);
+    std::swap(t[0], t[1]);
+    mesh.tetrahedra.push_back(t);
+  }
+  const Real lowest = half.vertices.row(0).minCoeff();
+  mesh.vertices.row(0).head(size).array() -= lowest;
+  mesh.vertices.row(0).tail(size).array() += lowest;
+  repair(mesh, MeshOrigin{});
+  EXPECT_EQ(to_text(mesh.repairs), "merged 9 vertices");
+  EXPECT_EQ(mesh.vertices.cols(), 2 * size - 9);
+  EXPECT_NEAR(volume(mesh), 2, 1e-14);
+  EXPECT_EQ(boundary_faces(mesh.tetrahedra).size(), 2 * boundary_faces(half.tetrahedra).size() - 16);
+}
+
+TEST(Repair, DropsAFlatTetrahedronInAHundredOfAFile) {
+  TetMesh mesh = make_box({1, 1, 1}, {3, 3, 3});
+  const std::size_t whole = mesh.tetrahedra.size();
+  ASSERT_GE(whole, 100u);
+  const Tetrahedron flat{0, 1, 2, 3};  // in a row
+  mesh.tetrahedra.insert(mesh.tetrahedra.begin() + 5, flat);
+  TetMesh by_hand = mesh;
+  EXPECT_THROW(repair(by_hand), std::invalid_argument);
+  repair(mesh, MeshOrigin{});
+  EXPECT_EQ(to_text(mesh.repairs), "dropped 1 doubled or flat tetrahedron");
+  EXPECT_EQ(mesh.tetrahedra.size(), whole);
+  EXPECT_NEAR(volume(mesh), 1, 1e-14);
 }
 
 TEST(Repair, DropsUnmentionedVerticesAndKeepsTheOrderOfTheRest) {

@@ -11,8 +11,6 @@
 namespace penalty {
 namespace {
 
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f'; }
-
 // from_chars takes no plus sign, files do.
 std::string_view without_plus(std::string_view word) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
@@ -38,6 +36,7 @@ std::string load_file(const std::filesystem::path& path) {
   std::string text(size, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uintmax_t>(stream.gcount()) != size) throw MeshError(name + ": cannot be read to its end");
+  if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);  // a byte order mark
   return text;
 }
 
@@ -65,17 +64,25 @@ void TextCursor::fail(std::string_view message) const {
   throw MeshError(text + std::string(message));
 }
 
+bool TextCursor::is_space(char c) const {
+  return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f' || (c == ',' && comment_ != '\0');
+}
+
+bool TextCursor::ends_line(std::size_t place) const {
+  return text_[place] == '\n' || (text_[place] == '\r' && (place + 1 == text_.size() || text_[place + 1] != '\n'));
+}
+
+std::size_t TextCursor::line_end() const { return std::min(text_.find_first_of("\r\n", at_), text_.size()); }
+
 void TextCursor::skip_space() {
   for (; at_ < text_.size(); ++at_) {
-    const char c = text_[at_];
-    if (c == '\n')
-      ++at_line_;
-    else if (comment_ != '\0' && c == comment_) {
-      at_ = std::min(text_.find('\n', at_), text_.size());
+    if (comment_ != '\0' && text_[at_] == comment_) {
+      at_ = line_end();
       if (at_ == text_.size()) break;
-      ++at_line_;
-    } else if (!is_space(c))
+    } else if (!is_space(text_[at_])) {
       break;
+    }
+    if (ends_line(at_)) ++at_line_;
   }
 }
 
@@ -111,7 +118,13 @@ std::int64_t TextCursor::integer(std::string_view what) {
 }
 
 Real TextCursor::real(std::string_view what) {
-  const std::string_view found = word(what), digits = without_plus(found);
+  const std::string_view found = word(what);
+  std::string fortran;  // 1.0D+00
+  if (found.find_first_of("dD") != found.npos) {
+    fortran = found;
+    std::replace_if(fortran.begin(), fortran.end(), [](char c) { return c == 'd' || c == 'D'; }, 'e');
+  }
+  const std::string_view digits = without_plus(fortran.empty() ? found : fortran);
   Real value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (end != digits.data() + digits.size() || error == std::errc::invalid_argument)
@@ -124,8 +137,7 @@ Real TextCursor::real(std::string_view what) {
   return value;
 }
 
-std::int64_t TextCursor::count(std::string_view what, std::size_t least_bytes) {
-  const std::int64_t value = integer(what);
+std::int64_t TextCursor::checked_count(std::int64_t value, std::string_view what, std::size_t least_bytes) const {
   if (value < 0) fail(std::string(what) + " is " + std::to_string(value) + ", below zero");
   if (static_cast<std::uint64_t>(value) > remaining() / least_bytes + 1)
     fail(std::string(what) + " is " + std::to_string(value) + ", more than the rest of the file can hold");
@@ -140,13 +152,14 @@ void TextCursor::expect(std::string_view wanted) {
 
 std::string_view TextCursor::rest_of_line() {
   line_ = at_line_;
-  const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+  const std::size_t end = line_end();
   std::string_view rest = text_.substr(at_, end - at_);
   at_ = end;
-  if (at_ < text_.size()) {
-    ++at_;
-    ++at_line_;
-  }
+  while (at_ < text_.size())
+    if (ends_line(at_++)) {
+      ++at_line_;
+      break;
+    }
   if (comment_ != '\0') rest = rest.substr(0, rest.find(comment_));
   while (!rest.empty() && is_space(rest.back())) rest.remove_suffix(1);
   while (!rest.empty() && is_space(rest.front())) rest.remove_prefix(1);
@@ -154,8 +167,9 @@ std::string_view TextCursor::rest_of_line() {
 }
 
 bool TextCursor::at_line_end() {
-  while (at_ < text_.size() && text_[at_] != '\n' && is_space(text_[at_])) ++at_;
-  return at_ == text_.size() || text_[at_] == '\n' || (comment_ != '\0' && text_[at_] == comment_);
+  const std::size_t end = line_end();
+  while (at_ < end && is_space(text_[at_])) ++at_;
+  return at_ == end || (comment_ != '\0' && text_[at_] == comment_);
 }
 
 std::string_view TextCursor::bytes(std::size_t count, std::string_view what) {

@@ -24,8 +24,8 @@ std::string printable(std::string_view text, std::size_t longest = 40);
 /// The same between quotes.
 std::string in_quotes(std::string_view text);
 
-/// Reads words, numbers and lines from a text. Words end at white space, which includes line ends; a comment runs from
-/// `comment` to the end of its line. Everything that is missing or malformed throws MeshError with file and line.
+/// Reads words, numbers and lines from a text. Words end at white space, which includes line ends, those of other systems
+/// too; a comment runs from `comment` to the end of its line. Where there are comments, commas are white space. Everything that is missing or malformed throws MeshError with file and line.
 class TextCursor {
  public:
   TextCursor(std::string file, std::string_view text, char comment = '\0')
@@ -39,9 +39,12 @@ class TextCursor {
   std::string_view word(std::string_view what);  // `what` is wanted: for the message
   std::string_view peek() const;                 // the next word, left in place; empty at the end
   std::int64_t integer(std::string_view what);
-  Real real(std::string_view what);  // "nan" and "inf" pass: repair() names the coordinate
-  std::int64_t count(std::string_view what,
-                     std::size_t least_bytes);  // 0 or more, and that many items of least_bytes fit
+  Real real(std::string_view what);  // Fortran's 1.0D+00, too; "nan" and "inf" pass: repair() names the coordinate
+  std::int64_t count(std::string_view what, std::size_t least_bytes) {  // as `checked_count`
+    return checked_count(integer(what), what, least_bytes);
+  }
+  std::int64_t checked_count(std::int64_t value, std::string_view what,
+                             std::size_t least_bytes) const;  // 0 or more, and that many items of least_bytes fit
   void expect(std::string_view word);
 
   std::string_view rest_of_line();  // without its end, comment or surrounding white space; moves to the next line
@@ -53,6 +56,9 @@ class TextCursor {
   [[noreturn]] void fail(std::string_view message) const;
 
  private:
+  bool is_space(char c) const;
+  bool ends_line(std::size_t place) const;  // the last byte of a line end stands there
+  std::size_t line_end() const;             // from where on the line is over
   void skip_space();
 
   std::string file_;

@@ -4,8 +4,21 @@
 #include <limits>
 #include <optional>
 
+#include "split_solid.h"
+
 namespace penalty {
 namespace {
+
+[[noreturn]] void fail_about_twins(const MeshOrigin& origin, int first, int second) {
+  const bool in_lines = !origin.vertex_lines.empty();
+  std::string message = origin.vertex_file;
+  if (in_lines) message.append(":").append(std::to_string(origin.vertex_lines[second]));
+  message.append(": vertex ")
+      .append(std::to_string(origin.vertex_tags[second]))
+      .append(": the number was given before");
+  if (in_lines) message.append(", in line ").append(std::to_string(origin.vertex_lines[first]));
+  throw MeshError(message);
+}
 
 // Finds the vertex of a tag. Files number almost always without gaps: one look then, else a binary search.
 class TagIndex {
@@ -16,10 +29,7 @@ class TagIndex {
     for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = static_cast<int>(i);
     std::stable_sort(order_.begin(), order_.end(), [this](int l, int r) { return tags_[l] < tags_[r]; });
     for (std::size_t i = 1; i < order_.size(); ++i)
-      if (tags_[order_[i]] == tags_[order_[i - 1]])
-        throw MeshError(origin.vertex_file + ":" + std::to_string(origin.vertex_lines[order_[i]]) + ": vertex " +
-                        std::to_string(tags_[order_[i]]) + ": the number was given before, in line " +
-                        std::to_string(origin.vertex_lines[order_[i - 1]]));
+      if (tags_[order_[i]] == tags_[order_[i - 1]]) fail_about_twins(origin, order_[i - 1], order_[i]);
   }
 
   std::optional<int> find(std::int64_t tag) const {
@@ -61,38 +71,54 @@ void RawMesh::add_vertex(TextCursor& text) {
   }
 }
 
-void RawMesh::add_tetrahedron(TextCursor& text, std::int64_t tag) {
-  std::array<std::int64_t, 4> corners;
-  for (std::int64_t& corner : corners) corner = text.integer("a corner");
-  tetrahedra.push_back(corners);
+void RawMesh::add(Solid solid, std::span<const std::int64_t> corners, std::int64_t tag, int line) {
+  solids_.push_back(solid);
+  corners_.insert(corners_.end(), corners.begin(), corners.begin() + static_cast<int>(solid));
   origin.tetrahedron_tags.push_back(tag);
-  origin.tetrahedron_lines.push_back(text.line());
+  if (line > 0) origin.tetrahedron_lines.push_back(line);
 }
 
 TetMesh RawMesh::finish(std::string source) && {
+  if (solids_.empty() && skipped_ > 0)
+    throw MeshError(source + ": no solids, only points, lines and faces (" + std::to_string(skipped_) +
+                    "): fill them with tetrahedra (gmsh -3), or give a closed surface as .obj, .ply or .stl");
   TetMesh mesh;
   mesh.source = std::move(source);
   mesh.vertices =
       Eigen::Map<const Eigen::Matrix3Xd>(coordinates.data(), 3, static_cast<Eigen::Index>(coordinates.size() / 3));
-  mesh.tetrahedra.reserve(tetrahedra.size());
+  mesh.tetrahedra.reserve(solids_.size());
   const TagIndex index(origin);
   const bool tagged = !origin.vertex_tags.empty();
   const auto vertices = static_cast<std::int64_t>(mesh.vertices.cols());
-  for (std::size_t i = 0; i < tetrahedra.size(); ++i) {
-    Tetrahedron t;
-    for (int k = 0; k < 4; ++k) {
-      const std::int64_t corner = tetrahedra[i][k];
-      std::optional<int> found;
-      if (tagged)
-        found = index.find(corner);
-      else if (corner >= 0 && corner < vertices)
-        found = static_cast<int>(corner);
-      if (!found)
-        fail_about_corner(origin, i, corner, tagged ? "" : " is outside 0 to " + std::to_string(vertices - 1));
-      t[k] = *found;
+  const auto index_of = [&](std::int64_t corner, std::size_t solid) {
+    std::optional<int> found;
+    if (tagged)
+      found = index.find(corner);
+    else if (corner >= 0 && corner < vertices)
+      found = static_cast<int>(corner);
+    if (!found)
+      fail_about_corner(origin, solid, corner, tagged ? "" : " is outside 0 to " + std::to_string(vertices - 1));
+    return *found;
+  };
+  std::vector<std::int64_t> tags;  // of the tetrahedra, which are those of their solids
+  std::vector<int> lines;
+  auto next = corners_.begin();
+  for (std::size_t i = 0; i < solids_.size(); ++i) {
+    std::array<int, 8> corners{};
+    const auto size = static_cast<std::size_t>(solids_[i]);
+    for (std::size_t k = 0; k < size; ++k) corners[k] = index_of(*next++, i);
+    if (solids_[i] == Solid::tetrahedron) {
+      mesh.tetrahedra.push_back({corners[0], corners[1], corners[2], corners[3]});
+    } else {
+      split(solids_[i], std::span(corners).first(size), mesh.vertices, mesh.tetrahedra);
+      ++mesh.repairs.split_solids;
     }
-    mesh.tetrahedra.push_back(t);
+    tags.resize(mesh.tetrahedra.size(), origin.tetrahedron_tags[i]);
+    if (!origin.tetrahedron_lines.empty()) lines.resize(mesh.tetrahedra.size(), origin.tetrahedron_lines[i]);
   }
+  origin.tetrahedron_tags = std::move(tags);
+  origin.tetrahedron_lines = std::move(lines);
+  mesh.repairs.reduced_solids = reduced_;
   repair(mesh, origin);
   return mesh;
 }

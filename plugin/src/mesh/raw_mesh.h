@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <filesystem>
+#include <span>
 #include <vector>
 
 #include "mesh_text.h"
@@ -9,18 +10,35 @@
 
 namespace penalty {
 
-struct RawMesh {
-  std::vector<Real> coordinates;                        // x y z of each vertex
-  std::vector<std::array<std::int64_t, 4>> tetrahedra;  // vertex tags, or indices if there are no vertex tags
-  MeshOrigin origin;
+/// Solid elements by the corners that they have.
+enum class Solid : std::uint8_t { tetrahedron = 4, pyramid = 5, prism = 6, hexahedron = 8 };
+
+class RawMesh {
+ public:
+  std::vector<Real> coordinates;  // x y z of each vertex
+  MeshOrigin origin;              // tags of vertices only if the file has some
 
   /// Reads x y z, the coordinates of the next vertex.
   void add_vertex(TextCursor& text);
-  /// Reads four corners of the next tetrahedron.
-  void add_tetrahedron(TextCursor& text, std::int64_t tag);
 
-  /// Turns tags into indices and repairs. Throws MeshError.
+  /// `corners` are tags of vertices, or indices if there are no tags; a hexahedron lists two opposite faces, each going
+  /// round, a prism likewise, a pyramid its base. Without a `line` it is not known.
+  void add(Solid solid, std::span<const std::int64_t> corners, std::int64_t tag, int line = 0);
+
+  /// A solid was of higher order: what it has beside corners is left out.
+  void count_reduced() { ++reduced_; }
+
+  /// A point, a line or a face was left out.
+  void count_skipped() { ++skipped_; }
+
+  /// Turns tags into indices, splits solids into tetrahedra so that those on both sides of a face agree, and repairs.
+  /// Throws MeshError.
   TetMesh finish(std::string source) &&;
+
+ private:
+  std::vector<Solid> solids_;
+  std::vector<std::int64_t> corners_;  // of all solids
+  int reduced_ = 0, skipped_ = 0;
 };
 
 TetMesh read_vtk(const std::filesystem::path& path);

@@ -1,167 +1,335 @@
-// Gmsh .msh 2.x and 4.1, ASCII.
+// Gmsh .msh of versions 1, 2, 4.0 and 4.1, ASCII and binary.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <optional>
+
 #include "raw_mesh.h"
 
 namespace penalty {
 namespace {
 
-enum class Layout { two, four_one };
+enum class Layout { one, two, four_zero, four_one };
 
-enum class Element { tetrahedron, lower_dimension, other_solid };
+// What the Gmsh manual, section "MSH file format", says of an element type. All list their corners first.
+struct ElementType {
+  int nodes;
+  std::optional<Solid> solid;  // none: a point, a line or a face
+};
 
-// Element types of the Gmsh manual, section "MSH file format". Second-order tetrahedra list their corners first.
-Element element_of(std::int64_t type) {
+std::optional<ElementType> element_type(std::int64_t type) {
+  constexpr int lower[] = {0, 2, 3, 4, 0, 0, 0, 0, 3, 6, 9, 0, 0, 0, 0, 1, 8, 0, 0, 0, 9, 10, 12, 15, 15, 21, 4, 5, 6};
+  if (type > 0 && type < 29 && lower[type] > 0) return ElementType{lower[type], std::nullopt};
   switch (type) {
+    case 36:
+      return ElementType{16, std::nullopt};
+    case 37:
+      return ElementType{25, std::nullopt};
+    case 38:
+      return ElementType{36, std::nullopt};
     case 4:
+      return ElementType{4, Solid::tetrahedron};
     case 11:
+      return ElementType{10, Solid::tetrahedron};
     case 29:
+      return ElementType{20, Solid::tetrahedron};
     case 30:
-    case 31:  // of order 1 to 5
-      return Element::tetrahedron;
-    case 1:
-    case 2:
-    case 3:
-    case 8:
-    case 9:
-    case 10:
-    case 15:
-    case 16:
-    case 20:
-    case 21:
-    case 22:
-    case 23:
-    case 24:
-    case 25:
-    case 26:
-    case 27:
-    case 28:
-      return Element::lower_dimension;
+      return ElementType{35, Solid::tetrahedron};
+    case 31:
+      return ElementType{56, Solid::tetrahedron};
+    case 5:
+      return ElementType{8, Solid::hexahedron};
+    case 12:
+      return ElementType{27, Solid::hexahedron};
+    case 17:
+      return ElementType{20, Solid::hexahedron};
+    case 32:
+      return ElementType{22, Solid::tetrahedron};
+    case 33:
+      return ElementType{28, Solid::tetrahedron};
+    case 92:
+      return ElementType{64, Solid::hexahedron};
+    case 93:
+      return ElementType{125, Solid::hexahedron};
+    case 6:
+      return ElementType{6, Solid::prism};
+    case 13:
+      return ElementType{18, Solid::prism};
+    case 18:
+      return ElementType{15, Solid::prism};
+    case 7:
+      return ElementType{5, Solid::pyramid};
+    case 14:
+      return ElementType{14, Solid::pyramid};
+    case 19:
+      return ElementType{13, Solid::pyramid};
     default:
-      return Element::other_solid;
+      return std::nullopt;
   }
 }
 
-[[noreturn]] void refuse_solid(const TextCursor& text, std::int64_t type) {
-  std::string name;
-  if (type == 5 || type == 12 || type == 17) name = " (hexahedron)";
-  if (type == 6 || type == 13 || type == 18) name = " (prism)";
-  if (type == 7 || type == 14 || type == 19) name = " (pyramid)";
-  text.fail("element type " + std::to_string(type) + name + " is not a tetrahedron");
-}
-
-Layout read_format(TextCursor& text) {
-  if (text.word("$MeshFormat") != "$MeshFormat") text.fail("not a Gmsh mesh of version 2 or 4: $MeshFormat is missing");
-  const std::string_view version = text.word("the version");
-  const bool two = version == "2" || version.starts_with("2.");
-  if (!two && version != "4.1") text.fail("version " + in_quotes(version) + " is neither 2.x nor 4.1");
-  const std::int64_t binary = text.integer("the file type");
-  if (binary != 0) text.fail("binary Gmsh files are not read: save it as ASCII");
-  text.rest_of_line();
-  text.expect("$EndMeshFormat");
-  return two ? Layout::two : Layout::four_one;
-}
-
-void read_nodes_2(TextCursor& text, RawMesh& mesh) {
-  const std::int64_t count = text.count("the number of nodes", 8);
-  for (std::int64_t i = 0; i < count; ++i) {
-    text.within("node", i);
-    const std::int64_t tag = text.integer("the number of the node");
-    text.within("vertex", tag);
-    mesh.origin.vertex_tags.push_back(tag);
-    mesh.add_vertex(text);
+class GmshReader {
+ public:
+  GmshReader(std::string file, std::string_view contents) : text_(std::move(file), contents) {
+    mesh_.origin.vertex_file = mesh_.origin.tetrahedron_file = text_.file();
   }
-  text.within({});
-}
 
-void read_elements_2(TextCursor& text, RawMesh& mesh) {
-  const std::int64_t count = text.count("the number of elements", 6);
-  for (std::int64_t i = 0; i < count; ++i) {
-    text.within("element", i);
-    const std::int64_t tag = text.integer("the number of the element");
-    text.within("element", tag);
-    const std::int64_t type = text.integer("the element type");
-    const Element element = element_of(type);
-    if (element == Element::other_solid) refuse_solid(text, type);
-    if (element == Element::tetrahedron) {
-      const std::int64_t tags = text.integer("the number of tags");
-      for (std::int64_t k = 0; k < tags; ++k) text.word("a tag");
-      mesh.add_tetrahedron(text, tag);
+  TetMesh read() {
+    bool nodes = false, elements = false;
+    while (!(nodes && elements)) {  // later sections hold data, names, partitions
+      if (text_.at_end()) text_.fail(std::string("the section ") + (nodes ? "$Elements" : "$Nodes") + " is missing");
+      const std::string_view section = text_.word("a section");
+      if (!section.starts_with('$') || section.starts_with("$End"))
+        text_.fail("found " + in_quotes(section) + " where a section should begin");
+      if (section == "$MeshFormat") {
+        read_format();
+      } else if (!nodes && (section == "$Nodes" || section == "$NOD")) {
+        require_format(section);
+        read_nodes();
+        nodes = true;
+      } else if (!elements && (section == "$Elements" || section == "$ELM")) {
+        require_format(section);
+        read_elements();
+        elements = true;
+      } else {
+        skip(section);
+        continue;
+      }
+      text_.expect(end_of(section));
     }
-    text.rest_of_line();
+    const std::string source = text_.file();
+    return std::move(mesh_).finish(source);
   }
-  text.within({});
-}
 
-void read_nodes_41(TextCursor& text, RawMesh& mesh) {
-  const std::int64_t blocks = text.count("the number of node blocks", 8);
-  text.rest_of_line();  // totals: the blocks say the same
-  for (std::int64_t block = 0; block < blocks; ++block) {
-    text.within("node block", block);
-    const std::int64_t dimension = text.integer("the entity dimension");
-    text.integer("the entity tag");
-    const std::int64_t parameters = text.integer("the parametric flag") != 0 ? dimension : 0;
-    const std::int64_t count = text.count("the number of nodes", 8);
-    const std::size_t first = mesh.origin.vertex_tags.size();
-    for (std::int64_t i = 0; i < count; ++i) mesh.origin.vertex_tags.push_back(text.integer("a node tag"));
-    for (std::int64_t i = 0; i < count; ++i) {
-      text.within("vertex", mesh.origin.vertex_tags[first + static_cast<std::size_t>(i)]);
-      mesh.add_vertex(text);
-      for (std::int64_t k = 0; k < parameters; ++k) text.real("a parameter");
+ private:
+  static std::string end_of(std::string_view section) {
+    const bool is_old = section == "$NOD" || section == "$ELM";
+    return std::string(is_old ? "$END" : "$End").append(section.substr(1));
+  }
+
+  void skip(std::string_view section) {
+    const std::string end = end_of(section);
+    text_.rest_of_line();
+    while (text_.rest_of_line() != end)
+      if (text_.at_end()) text_.fail("the file ends within the section " + in_quotes(section));
+  }
+
+  void require_format(std::string_view section) {
+    if (section == "$NOD" || section == "$ELM")
+      layout_ = Layout::one;
+    else if (!layout_)
+      text_.fail("found " + in_quotes(section) + " before $MeshFormat, which says how to read it");
+  }
+
+  void read_format() {
+    const std::string_view version = text_.word("the version");
+    if (version == "2" || version.starts_with("2."))
+      layout_ = Layout::two;
+    else if (version == "4" || version == "4.0")
+      layout_ = Layout::four_zero;
+    else if (version == "4.1")
+      layout_ = Layout::four_one;
+    else
+      text_.fail("version " + in_quotes(version) +
+                 " is none of 1, 2.x, 4.0 and 4.1: write another with gmsh -save -format msh41");
+    const std::int64_t type = text_.integer("the file type");
+    if (type != 0 && type != 1)
+      text_.fail("the file type is " + std::to_string(type) + ", not 0 (ASCII) or 1 (binary)");
+    text_.rest_of_line();
+    if (type == 1) read_byte_order();
+  }
+
+  // After its heading a binary file has the number one.
+  void read_byte_order() {
+    is_binary_ = true;
+    const auto one = raw<std::int32_t>("the byte order");
+    is_swapped_ = one != 1;
+    if (one != 1 && one != 0x01000000)
+      text_.fail("the byte order is " + std::to_string(one) + ", not 1 in either order");
+  }
+
+  template <class T>
+  T raw(std::string_view what) {
+    const std::string_view found = text_.bytes(sizeof(T), what);
+    std::array<char, sizeof(T)> bytes;
+    std::copy(found.begin(), found.end(), bytes.begin());
+    if (is_swapped_) std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+  }
+
+  // The numbers of a section: what the manual calls int, size_t (unsigned long in 4.0) and double.
+  std::int64_t integer(std::string_view what) { return is_binary_ ? raw<std::int32_t>(what) : text_.integer(what); }
+  std::int64_t size(std::string_view what) { return is_binary_ ? raw<std::int64_t>(what) : text_.integer(what); }
+  Real real(std::string_view what) { return is_binary_ ? raw<double>(what) : text_.real(what); }
+
+  // How many items there are, each of that many bytes in a text or in a binary file.
+  std::int64_t count(std::string_view what, std::size_t in_text, std::size_t in_binary) {
+    return text_.checked_count(size(what), what, is_binary_ ? in_binary : in_text);
+  }
+
+  void begin_section() {
+    if (is_binary_) text_.rest_of_line();
+  }
+
+  void read_nodes() {
+    begin_section();
+    if (*layout_ == Layout::one || *layout_ == Layout::two) {
+      const std::int64_t nodes = text_.count("the number of nodes", 8);
+      begin_section();
+      add_nodes(nodes, 0);
+    } else {
+      const std::int64_t blocks = count("the number of node blocks", 8, 20);
+      for (int k = 0; k < (*layout_ == Layout::four_one ? 3 : 1); ++k) size("a total");  // the blocks say the same
+      for (std::int64_t block = 0; block < blocks; ++block) {
+        text_.within("node block", block);
+        const std::int64_t first = integer("the entity"), second = integer("the entity");  // dimension and tag
+        const std::int64_t dimension = *layout_ == Layout::four_one ? first : second;
+        const bool is_parametric = integer("the parametric flag") != 0;
+        const std::int64_t nodes = count("the number of nodes", 8, 28);
+        const std::int64_t parameters = is_parametric ? dimension : 0;
+        if (parameters < 0 || parameters > 3)
+          text_.fail("the entity dimension is " + std::to_string(parameters) + ", not 0 to 3");
+        *layout_ == Layout::four_one ? add_tagged_nodes(nodes, parameters) : add_nodes(nodes, parameters);
+      }
+    }
+    text_.within({});
+  }
+
+  void add_nodes(std::int64_t nodes, std::int64_t parameters) {
+    for (std::int64_t i = 0; i < nodes; ++i) {
+      text_.within("node", i);
+      const std::int64_t tag = integer("the number of the node");
+      mesh_.origin.vertex_tags.push_back(tag);
+      add_vertex(tag, parameters);
     }
   }
-  text.within({});
-}
 
-void read_elements_41(TextCursor& text, RawMesh& mesh) {
-  const std::int64_t blocks = text.count("the number of element blocks", 8);
-  text.rest_of_line();
-  for (std::int64_t block = 0; block < blocks; ++block) {
-    text.within("element block", block);
-    text.integer("the entity dimension");
-    text.integer("the entity tag");
-    const std::int64_t type = text.integer("the element type");
-    const std::int64_t count = text.count("the number of elements", 4);
-    const Element element = element_of(type);
-    if (element == Element::other_solid && count > 0) refuse_solid(text, type);
-    for (std::int64_t i = 0; i < count; ++i) {
-      const std::int64_t tag = text.integer("the number of the element");
-      text.within("element", tag);
-      if (element == Element::tetrahedron) mesh.add_tetrahedron(text, tag);
-      text.rest_of_line();
+  // All tags, then all places.
+  void add_tagged_nodes(std::int64_t nodes, std::int64_t parameters) {
+    const std::size_t first = mesh_.origin.vertex_tags.size();
+    for (std::int64_t i = 0; i < nodes; ++i) mesh_.origin.vertex_tags.push_back(size("a node tag"));
+    for (std::int64_t i = 0; i < nodes; ++i)
+      add_vertex(mesh_.origin.vertex_tags[first + static_cast<std::size_t>(i)], parameters);
+  }
+
+  void add_vertex(std::int64_t tag, std::int64_t parameters) {
+    text_.within("vertex", tag);
+    if (is_binary_)
+      for (int axis = 0; axis < 3; ++axis) mesh_.coordinates.push_back(real("a coordinate"));
+    else
+      mesh_.add_vertex(text_);
+    for (std::int64_t k = 0; k < parameters; ++k) real("a parameter");
+  }
+
+  void read_elements() {
+    begin_section();
+    switch (*layout_) {
+      case Layout::one:
+      case Layout::two:
+        is_binary_ ? read_elements_in_runs() : read_elements_in_lines();
+        break;
+      case Layout::four_zero:
+      case Layout::four_one:
+        read_elements_in_blocks();
+        break;
+    }
+    text_.within({});
+  }
+
+  // tag, type, tags, nodes
+  void read_elements_in_lines() {
+    const std::int64_t elements = text_.count("the number of elements", 6);
+    for (std::int64_t i = 0; i < elements; ++i) {
+      text_.within("element", i);
+      const std::int64_t tag = text_.integer("the number of the element");
+      text_.within("element", tag);
+      const std::optional<ElementType> type = read_type();
+      if (!type) refuse_type();
+      if (type->solid) {
+        const std::int64_t tags = *layout_ == Layout::one ? 3 : text_.integer("the number of tags");
+        for (std::int64_t k = 0; k < tags; ++k) text_.integer("a tag");
+      }
+      add_element(*type, tag, 4);
     }
   }
-  text.within({});
-}
+
+  // Runs of elements of one type, each run after its type, size and number of tags.
+  void read_elements_in_runs() {
+    const std::int64_t elements = text_.count("the number of elements", 8);
+    begin_section();
+    for (std::int64_t read = 0; read < elements;) {
+      text_.within("element", read);
+      const std::optional<ElementType> type = read_type();
+      const std::int64_t run = integer("the number of elements of this type"), tags = integer("the number of tags");
+      if (run <= 0 || run > elements - read)
+        text_.fail("a run of " + std::to_string(run) + " elements, where " + std::to_string(elements - read) +
+                   " are left");
+      if (!type) refuse_type();
+      if (tags < 0) text_.fail("the number of tags is " + std::to_string(tags) + ", below zero");
+      for (std::int64_t i = 0; i < run; ++i, ++read) {
+        const std::int64_t tag = integer("the number of the element");
+        text_.within("element", tag);
+        text_.bytes(4 * static_cast<std::size_t>(tags), "the tags");
+        add_element(*type, tag, 4);
+      }
+    }
+  }
+
+  void read_elements_in_blocks() {
+    const bool is_four_one = *layout_ == Layout::four_one;
+    const std::int64_t blocks = count("the number of element blocks", 8, 20);
+    for (int k = 0; k < (is_four_one ? 3 : 1); ++k) size("a total");
+    for (std::int64_t block = 0; block < blocks; ++block) {
+      text_.within("element block", block);
+      integer("the entity");
+      integer("the entity");
+      const std::optional<ElementType> type = read_type();
+      const std::int64_t elements = count("the number of elements", 4, 8);
+      if (!type && elements > 0) refuse_type();
+      for (std::int64_t i = 0; i < elements; ++i) {
+        const std::int64_t tag = is_four_one ? size("the number of the element") : integer("the number of the element");
+        text_.within("element", tag);
+        add_element(*type, tag, is_four_one ? 8 : 4);
+      }
+    }
+  }
+
+  std::optional<ElementType> read_type() { return element_type(type_ = integer("the element type")); }
+
+  [[noreturn]] void refuse_type() const {
+    text_.fail("element type " + std::to_string(type_) + " is not read: save the mesh with elements of first order");
+  }
+
+  // Reads the nodes of an element; in a binary file each has so many bytes.
+  void add_element(const ElementType& type, std::int64_t tag, std::size_t bytes) {
+    std::size_t corners = 0;
+    if (type.solid) {
+      std::array<std::int64_t, 8> nodes;
+      corners = static_cast<std::size_t>(*type.solid);
+      for (std::size_t k = 0; k < corners; ++k) nodes[k] = bytes == 8 ? size("a corner") : integer("a corner");
+      mesh_.add(*type.solid, std::span(nodes).first(corners), tag, is_binary_ ? 0 : text_.line());
+      if (static_cast<std::size_t>(type.nodes) > corners) mesh_.count_reduced();
+    } else {
+      mesh_.count_skipped();
+    }
+    if (is_binary_)
+      text_.bytes(bytes * (static_cast<std::size_t>(type.nodes) - corners), "the nodes of an element");
+    else
+      text_.rest_of_line();
+  }
+
+  TextCursor text_;
+  RawMesh mesh_;
+  std::optional<Layout> layout_;
+  std::int64_t type_ = 0;  // of the element read last
+  bool is_binary_ = false, is_swapped_ = false;
+};
 
 }  // namespace
 
 TetMesh read_gmsh(const std::filesystem::path& path) {
   const std::string contents = load_file(path);
-  TextCursor text(path.string(), contents);
-  RawMesh mesh;
-  mesh.origin.vertex_file = mesh.origin.tetrahedron_file = text.file();
-  const Layout layout = read_format(text);
-  bool nodes = false, elements = false;
-  while (!(nodes && elements)) {  // later sections hold data, names, partitions
-    if (text.at_end()) text.fail(nodes ? "the section $Elements is missing" : "the section $Nodes is missing");
-    const std::string_view section = text.word("a section");
-    if (section == "$Nodes" && !nodes) {
-      layout == Layout::two ? read_nodes_2(text, mesh) : read_nodes_41(text, mesh);
-      text.expect("$EndNodes");
-      nodes = true;
-    } else if (section == "$Elements" && !elements) {
-      layout == Layout::two ? read_elements_2(text, mesh) : read_elements_41(text, mesh);
-      text.expect("$EndElements");
-      elements = true;
-    } else if (section.starts_with('$') && !section.starts_with("$End")) {
-      const std::string end = "$End" + std::string(section.substr(1));
-      text.rest_of_line();
-      while (text.rest_of_line() != end)
-        if (text.at_end()) text.fail("the file ends within the section " + in_quotes(section));
-    } else {
-      text.fail("found " + in_quotes(section) + " where a section should begin");
-    }
-  }
-  return std::move(mesh).finish(text.file());
+  return GmshReader(path.string(), contents).read();
 }
 
 }  // namespace penalty

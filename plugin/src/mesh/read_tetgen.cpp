@@ -29,7 +29,10 @@ void read_elements(TextCursor& text, RawMesh& mesh) {
     text.within("element", i);
     const std::int64_t tag = text.integer("the number of the tetrahedron");
     text.within("tetrahedron", tag);
-    mesh.add_tetrahedron(text, tag);
+    std::array<std::int64_t, 4> nodes;
+    for (std::int64_t& node : nodes) node = text.integer("a corner");
+    mesh.add(Solid::tetrahedron, nodes, tag, text.line());
+    if (corners == 10) mesh.count_reduced();
     text.rest_of_line();
   }
 }

@@ -1,7 +1,8 @@
 // VTK legacy files with an UNSTRUCTURED_GRID, ASCII or BINARY (big-endian).
+#include <algorithm>
+#include <array>
 #include <bit>
-#include <cstring>
-#include <limits>
+#include <optional>
 
 #include "raw_mesh.h"
 
@@ -17,6 +18,61 @@ std::size_t size_of(std::string_view type) {
   if (name == "long" || name == "unsigned_long" || name == "double" || name == "vtktypeint64" || name == "vtkidtype")
     return 8;
   return 0;
+}
+
+// What VTK says of a type of cells. All list their corners first, and go round as ours do, but voxels.
+struct CellType {
+  int nodes;                   // 0: any number, of any order; -1: unknown
+  std::optional<Solid> solid;  // none: points, lines, faces
+  const char* name;
+};
+
+CellType cell_type(std::int64_t type) {
+  const bool is_lower = (type >= 0 && type <= 9) || (type >= 21 && type <= 23) || type == 28 || type == 30 ||
+                        (type >= 34 && type <= 36) || (type >= 68 && type <= 70) || (type >= 75 && type <= 77);
+  if (is_lower) return {0, std::nullopt, ""};
+  switch (type) {
+    case 10:
+      return {4, Solid::tetrahedron, "tetrahedron"};
+    case 11:
+      return {8, Solid::hexahedron, "voxel"};
+    case 12:
+      return {8, Solid::hexahedron, "hexahedron"};
+    case 13:
+      return {6, Solid::prism, "wedge"};
+    case 14:
+      return {5, Solid::pyramid, "pyramid"};
+    case 24:
+      return {10, Solid::tetrahedron, "tetrahedron"};
+    case 25:
+      return {20, Solid::hexahedron, "hexahedron"};
+    case 26:
+      return {15, Solid::prism, "wedge"};
+    case 27:
+      return {13, Solid::pyramid, "pyramid"};
+    case 29:
+      return {27, Solid::hexahedron, "hexahedron"};
+    case 31:
+      return {12, Solid::prism, "wedge"};
+    case 32:
+      return {18, Solid::prism, "wedge"};
+    case 33:
+      return {24, Solid::hexahedron, "hexahedron"};
+    case 71:
+    case 78:
+      return {0, Solid::tetrahedron, "tetrahedron"};
+    case 72:
+    case 79:
+      return {0, Solid::hexahedron, "hexahedron"};
+    case 73:
+    case 80:
+      return {0, Solid::prism, "wedge"};
+    case 74:
+    case 81:
+      return {0, Solid::pyramid, "pyramid"};
+    default:
+      return {-1, std::nullopt, ""};
+  }
 }
 
 template <class T>
@@ -63,8 +119,9 @@ class VtkReader {
   }
 
   void read_header() {
-    const std::string_view magic = text_.rest_of_line();
-    if (!lower_case(magic).starts_with("# vtk datafile version"))
+    std::string magic = lower_case(text_.rest_of_line());
+    std::erase(magic, ' ');
+    if (!magic.starts_with("#vtkdatafileversion"))
       text_.fail("not a legacy VTK file: it does not begin with '# vtk DataFile Version'");
     text_.rest_of_line();  // title
     const std::string form = lower_case(text_.word("ASCII or BINARY"));
@@ -158,85 +215,82 @@ class VtkReader {
     }
   }
 
-  // Until version 4: the number of corners before the corners of each cell.
+  // Until version 4: the number of corners before the corners of each cell. Some programs announce another size than that
+  // of the list: only a binary list goes by it.
   void read_counted_cells(std::int64_t cells, std::int64_t size) {
-    std::vector<std::int64_t> binary_list;
-    if (binary_) binary_list = integers(size, 4, "the cells");
+    std::vector<std::int64_t> list;
+    if (binary_) list = integers(size, 4, "the cells");
     std::int64_t used = 0;
+    const auto next = [&](const char* what) {
+      return binary_ ? list[static_cast<std::size_t>(used++)] : text_.integer(what);
+    };
     cell_begins_.push_back(0);
     for (std::int64_t i = 0; i < cells; ++i) {
       text_.within("cell", i);
-      if (used >= size) text_.fail("the list of " + std::to_string(size) + " numbers ends before it");
-      const std::int64_t corners =
-          binary_ ? binary_list[static_cast<std::size_t>(used)] : text_.integer("the number of corners");
-      ++used;
-      if (corners < 0 || corners > size - used)
+      if (binary_ && used >= size) text_.fail("the list of " + std::to_string(size) + " numbers ends before it");
+      const std::int64_t corners = next("the number of corners");
+      const std::int64_t room = binary_ ? size - used : static_cast<std::int64_t>(text_.remaining() / 2);
+      if (corners < 0 || corners > room)
         text_.fail("the number of corners is " + std::to_string(corners) + ", the list has room for " +
-                   std::to_string(size - used));
-      for (std::int64_t k = 0; k < corners; ++k, ++used) {
-        corners_.push_back(binary_ ? binary_list[static_cast<std::size_t>(used)] : text_.integer("a corner"));
+                   std::to_string(room));
+      for (std::int64_t k = 0; k < corners; ++k) {
+        corners_.push_back(next("a corner"));
         if (!binary_) corner_lines_.push_back(text_.line());
       }
       cell_begins_.push_back(static_cast<std::int64_t>(corners_.size()));
     }
     text_.within({});
-    if (used != size)
+    if (binary_ && used != size)
       text_.fail("the cells take " + std::to_string(used) + " numbers, not the " + std::to_string(size) + " announced");
   }
 
   void read_types() {
-    const std::int64_t count = text_.count("the number of cell types", binary_ ? 4 : 1);
-    const std::int64_t cells = std::max<std::int64_t>(static_cast<std::int64_t>(cell_begins_.size()) - 1, 0);
-    if (count != cells)
+    const std::int64_t announced = text_.integer("the number of cell types");
+    const std::size_t cells = cell_begins_.empty() ? 0 : cell_begins_.size() - 1;
+    if (!binary_ && text_.peek().empty() && all_have_four_corners()) {  // Bullet's own samples end here
+      for (std::size_t i = 0; i < cells; ++i) add_cell(i, 10);
+      return;
+    }
+    const std::int64_t count = text_.checked_count(announced, "the number of cell types", binary_ ? 4 : 1);
+    if (static_cast<std::size_t>(count) != cells)
       text_.fail("there are " + std::to_string(count) + " cell types for " + std::to_string(cells) + " cells");
     std::vector<std::int64_t> binary_types;
     if (binary_) binary_types = integers(count, 4, "the cell types");
-    for (std::int64_t i = 0; i < count; ++i) {
-      text_.within("cell", i);
-      add_cell(static_cast<std::size_t>(i),
-               binary_ ? binary_types[static_cast<std::size_t>(i)] : text_.integer("the type"));
+    for (std::size_t i = 0; i < cells; ++i) {
+      text_.within("cell", static_cast<std::int64_t>(i));
+      add_cell(i, binary_ ? binary_types[i] : text_.integer("the type"));
     }
   }
 
+  bool all_have_four_corners() const {
+    for (std::size_t i = 0; i + 1 < cell_begins_.size(); ++i)
+      if (cell_begins_[i + 1] - cell_begins_[i] != 4) return false;
+    return true;
+  }
+
   void add_cell(std::size_t cell, std::int64_t type) {
-    switch (type) {
-      case 10:
-      case 24:
-        break;  // tetrahedron; of second order, corners first
-      case 0:
-      case 1:
-      case 2:
-      case 3:
-      case 4:
-      case 5:
-      case 6:
-      case 7:
-      case 8:
-      case 9:  // points, lines, faces
-      case 21:
-      case 22:
-      case 23:
-      case 28:
-      case 30:
-      case 34:
-      case 35:
-      case 36:
-        return;  // the same of higher order
-      default:
-        text_.fail("type " + std::to_string(type) +
-                   (type == 12   ? " (hexahedron)"
-                    : type == 11 ? " (voxel)"
-                                 : "") +
-                   " is not a tetrahedron");
+    const CellType known = cell_type(type);
+    if (known.nodes < 0)
+      text_.fail("type " + std::to_string(type) + " is not read: save the mesh with cells of first or second order");
+    if (!known.solid) {
+      mesh_.count_skipped();
+      return;
     }
     const auto begin = static_cast<std::size_t>(cell_begins_[cell]);
-    const std::size_t corners = static_cast<std::size_t>(cell_begins_[cell + 1]) - begin;
-    const std::size_t wanted = type == 10 ? 4 : 10;
-    if (corners != wanted)
-      text_.fail("a tetrahedron with " + std::to_string(corners) + " corners, not " + std::to_string(wanted));
-    mesh_.tetrahedra.push_back({corners_[begin], corners_[begin + 1], corners_[begin + 2], corners_[begin + 3]});
-    mesh_.origin.tetrahedron_tags.push_back(static_cast<std::int64_t>(cell));
-    if (!corner_lines_.empty()) mesh_.origin.tetrahedron_lines.push_back(corner_lines_[begin]);
+    const std::size_t nodes = static_cast<std::size_t>(cell_begins_[cell + 1]) - begin;
+    const auto size = static_cast<std::size_t>(*known.solid);
+    const bool fits = known.nodes > 0 ? nodes == static_cast<std::size_t>(known.nodes) : nodes >= size;
+    if (!fits)
+      text_.fail(std::string("a ") + known.name + " with " + std::to_string(nodes) + " corners, not " +
+                 std::to_string(known.nodes > 0 ? known.nodes : static_cast<int>(size)));
+    std::array<std::int64_t, 8> corners;
+    std::copy_n(corners_.begin() + static_cast<std::ptrdiff_t>(begin), size, corners.begin());
+    if (type == 11) {  // a voxel goes by rows
+      std::swap(corners[2], corners[3]);
+      std::swap(corners[6], corners[7]);
+    }
+    mesh_.add(*known.solid, corners, static_cast<std::int64_t>(cell), corner_lines_.empty() ? 0 : corner_lines_[begin]);
+    if (nodes > size) mesh_.count_reduced();
   }
 
   void skip_field() {

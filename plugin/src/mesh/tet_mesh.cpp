@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 #include "mesh_text.h"
 
@@ -79,40 +80,106 @@ void check_indices(const TetMesh& mesh, const Complaint& complaint) {
   }
 }
 
-void check_duplicates(const TetMesh& mesh, const Complaint& complaint) {
+// Where the tetrahedra of the same four vertices are: calls twins(first, other) for each after the first of them.
+template <class Call>
+void for_each_twin(const TetMesh& mesh, const Call& twins) {
   std::vector<Tetrahedron> sorted = mesh.tetrahedra;
   for (Tetrahedron& t : sorted) std::sort(t.begin(), t.end());
   std::vector<std::size_t> order(sorted.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t l, std::size_t r) { return sorted[l] < sorted[r]; });
+  std::size_t first = 0;
   for (std::size_t k = 1; k < order.size(); ++k)
-    if (sorted[order[k - 1]] == sorted[order[k]]) {
-      const int line = complaint.tetrahedron_line(order[k - 1]);
-      complaint.about_tetrahedron(order[k], "same four vertices as " + complaint.tetrahedron_name(order[k - 1]) +
-                                                (line > 0 ? " (line " + std::to_string(line) + ")" : ""));
-    }
+    if (sorted[order[first]] == sorted[order[k]])
+      twins(order[first], order[k]);
+    else
+      first = k;
+}
+
+void check_duplicates(const TetMesh& mesh, const Complaint& complaint) {
+  for_each_twin(mesh, [&](std::size_t first, std::size_t other) {
+    complaint.about_tetrahedron(other, "same four vertices as " + complaint.tetrahedron_name(first));
+  });
+}
+
+struct Shape {
+  Real longest;   // edge [m]
+  Real relative;  // six volumes, signed, over its cube
+  Real six_volumes() const { return relative * longest * longest * longest; }
+  bool is_flat() const {
+    return !(std::abs(relative) >= flat_tetrahedron) || std::abs(six_volumes()) < 6 * std::numeric_limits<Real>::min();
+  }
+};
+
+Shape shape_of(const TetMesh& mesh, const Tetrahedron& t) {
+  Points<4> p;
+  for (int k = 0; k < 4; ++k) p.col(k) = mesh.vertices.col(t[k]);
+  Real longest = 0;
+  for (int a = 0; a < 4; ++a)
+    for (int b = a + 1; b < 4; ++b) longest = std::max(longest, (p.col(b) - p.col(a)).stableNorm());
+  // Scaled to unit size first: cubes of tiny lengths would underflow.
+  const Matrix3 sides = (p.rightCols<3>().colwise() - p.col(0).eval()) / (longest > 0 ? longest : 1);
+  return {longest, sides.col(0).dot(sides.col(1).cross(sides.col(2)))};
 }
 
 void orient(TetMesh& mesh, const Complaint& complaint) {
   for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i) {
     Tetrahedron& t = mesh.tetrahedra[i];
-    Points<4> p;
-    for (int k = 0; k < 4; ++k) p.col(k) = mesh.vertices.col(t[k]);
-    Real longest = 0;
-    for (int a = 0; a < 4; ++a)
-      for (int b = a + 1; b < 4; ++b) longest = std::max(longest, (p.col(b) - p.col(a)).stableNorm());
-    // Scaled to unit size first: cubes of tiny lengths would underflow.
-    const Matrix3 sides = (p.rightCols<3>().colwise() - p.col(0).eval()) / (longest > 0 ? longest : 1);
-    const Real relative = sides.col(0).dot(sides.col(1).cross(sides.col(2)));
-    const Real six_volumes = relative * longest * longest * longest;
-    if (!(std::abs(relative) >= flat_tetrahedron) || std::abs(six_volumes) < 6 * std::numeric_limits<Real>::min())
+    const Shape shape = shape_of(mesh, t);
+    if (shape.is_flat())
       complaint.about_tetrahedron(
-          i, "flat: volume " + to_text(six_volumes / 6) + " at a longest edge of " + to_text(longest));
-    if (relative < 0) {
+          i, "flat: volume " + to_text(shape.six_volumes() / 6) + " at a longest edge of " + to_text(shape.longest));
+    if (shape.relative < 0) {
       std::swap(t[2], t[3]);
       ++mesh.repairs.reoriented;
     }
   }
+}
+
+// Vertices of tetrahedra that stand in one place become the first of them.
+void merge_vertices(TetMesh& mesh) {
+  std::vector<int> kept(static_cast<std::size_t>(mesh.vertices.cols()), -1);
+  for (const Tetrahedron& t : mesh.tetrahedra)
+    for (const int v : t) kept[v] = v;
+  std::vector<int> order;
+  for (const int v : kept)
+    if (v >= 0) order.push_back(v);
+  const auto place = [&](int v) { return std::tuple(mesh.vertices(0, v), mesh.vertices(1, v), mesh.vertices(2, v)); };
+  std::stable_sort(order.begin(), order.end(), [&](int l, int r) { return place(l) < place(r); });
+  int merged = 0;
+  for (std::size_t k = 1; k < order.size(); ++k)
+    if (place(order[k - 1]) == place(order[k])) {
+      kept[order[k]] = kept[order[k - 1]];
+      ++merged;
+    }
+  if (merged == 0) return;
+  for (Tetrahedron& t : mesh.tetrahedra)
+    for (int& v : t) v = kept[v];
+  mesh.repairs.merged_vertices += merged;
+  mesh.repairs.dropped_vertices -= merged;  // as which they will be counted
+}
+
+// Of twins all but the first, and what is flat, if that is little.
+void drop_tetrahedra(TetMesh& mesh, MeshOrigin& origin) {
+  std::vector<bool> is_dropped(mesh.tetrahedra.size(), false);
+  for_each_twin(mesh, [&](std::size_t, std::size_t other) { is_dropped[other] = true; });
+  std::vector<std::size_t> flat;
+  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i)
+    if (!is_dropped[i] && shape_of(mesh, mesh.tetrahedra[i]).is_flat()) flat.push_back(i);
+  if (100 * flat.size() <= mesh.tetrahedra.size())
+    for (const std::size_t i : flat) is_dropped[i] = true;
+  const auto keep = [&](auto& list) {
+    if (list.size() != is_dropped.size()) return;
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < list.size(); ++i)
+      if (!is_dropped[i]) list[size++] = list[i];
+    list.resize(size);
+  };
+  const std::size_t before = mesh.tetrahedra.size();
+  keep(origin.tetrahedron_tags);
+  keep(origin.tetrahedron_lines);
+  keep(mesh.tetrahedra);
+  mesh.repairs.dropped_tetrahedra += static_cast<int>(before - mesh.tetrahedra.size());
 }
 
 void drop_unused_vertices(TetMesh& mesh) {
@@ -133,20 +200,47 @@ void drop_unused_vertices(TetMesh& mesh) {
     for (int& v : t) v = new_index[v];
 }
 
-void repair(TetMesh& mesh, const Complaint& complaint) {
+void check(const TetMesh& mesh, const Complaint& complaint) {
   check_vertices(mesh, complaint);
   if (mesh.tetrahedra.empty()) complaint.about_mesh("the mesh has no tetrahedra");
   check_indices(mesh, complaint);
+}
+
+}  // namespace
+
+void repair(TetMesh& mesh) {
+  const Complaint complaint(mesh, nullptr);
+  check(mesh, complaint);
   check_duplicates(mesh, complaint);
   orient(mesh, complaint);
   drop_unused_vertices(mesh);
 }
 
-}  // namespace
+void repair(TetMesh& mesh, const MeshOrigin& origin) {
+  MeshOrigin of_kept = origin;
+  const Complaint complaint(mesh, &of_kept);
+  check(mesh, complaint);
+  merge_vertices(mesh);
+  drop_tetrahedra(mesh, of_kept);
+  orient(mesh, complaint);
+  drop_unused_vertices(mesh);
+}
 
-void repair(TetMesh& mesh) { repair(mesh, Complaint(mesh, nullptr)); }
-
-void repair(TetMesh& mesh, const MeshOrigin& origin) { repair(mesh, Complaint(mesh, &origin)); }
+std::string to_text(const MeshRepair& repairs) {
+  std::string text;
+  const auto add = [&text](const char* did, int count, const char* one, const char* many) {
+    if (count == 0) return;
+    if (!text.empty()) text += ", ";
+    text += std::string(did) + " " + std::to_string(count) + " " + (count == 1 ? one : many);
+  };
+  add("merged", repairs.merged_vertices, "vertex", "vertices");
+  add("dropped", repairs.dropped_vertices, "vertex of no element", "vertices of no element");
+  add("dropped", repairs.dropped_tetrahedra, "doubled or flat tetrahedron", "doubled or flat tetrahedra");
+  add("turned", repairs.reoriented, "left-handed tetrahedron", "left-handed tetrahedra");
+  add("cut", repairs.split_solids, "solid into tetrahedra", "solids into tetrahedra");
+  add("reduced", repairs.reduced_solids, "element of higher order", "elements of higher order");
+  return text;
+}
 
 Real volume(const TetMesh& mesh) {
   const std::vector<Real> volumes = signed_volumes(mesh.vertices, mesh.tetrahedra);

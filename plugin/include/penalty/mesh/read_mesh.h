@@ -12,11 +12,11 @@ bool is_tetrahedral_mesh_file(const std::filesystem::path& path);
 
 /// Reads by extension:
 ///   .vtk         legacy UNSTRUCTURED_GRID, ASCII or BINARY, file versions 1 to 5.1.
-///   .msh         Gmsh 2.x and 4.1, ASCII; node tags may be sparse.
+///   .msh         Gmsh 1, 2.x, 4.0 and 4.1, ASCII or binary; node tags may be sparse.
 ///   .node, .ele  TetGen; the other file of the pair is found by name, and the common stem does too. Points carry any
 ///                numbers, as a rule from 0 or 1.
-/// Tetrahedra are taken, of higher-order ones the corners; points, lines and faces are skipped; other solid elements
-/// are refused.
+/// Tetrahedra are taken; hexahedra, prisms and pyramids are cut into tetrahedra; of elements of higher order the corners
+/// count; points, lines and faces are skipped. What was changed on the way stands in `repairs`.
 /// Coordinates are metres. Numbers are read the same way in every locale. Memory is bounded by the size of the file,
 /// whatever its header claims. The mesh has gone through `repair`.
 /// Throws MeshError with one line for everything that is wrong with the file, std::bad_alloc for lack of memory.

@@ -17,11 +17,18 @@ class MeshError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What `repair` changed.
+/// What reading and `repair` changed.
 struct MeshRepair {
-  int reoriented = 0;        // left-handed tetrahedra whose last two vertices were swapped
-  int dropped_vertices = 0;  // vertices that no tetrahedron mentions
+  int reoriented = 0;          // left-handed tetrahedra whose last two vertices were swapped
+  int dropped_vertices = 0;    // vertices that no tetrahedron mentions
+  int merged_vertices = 0;     // vertices that stand where another one does
+  int dropped_tetrahedra = 0;  // ones that are there already, or flat
+  int split_solids = 0;        // pyramids, prisms and hexahedra that were cut into tetrahedra
+  int reduced_solids = 0;      // elements of higher order that became ones of their corners
 };
+
+/// In words, e.g. "merged 4 vertices, dropped 1 tetrahedron"; empty where nothing was changed.
+std::string to_text(const MeshRepair& repairs);
 
 struct TetMesh {
   Eigen::Matrix3Xd vertices;            // 3 x V [m]
@@ -53,7 +60,9 @@ inline constexpr Real largest_coordinate = 1e100;
 /// Throws std::invalid_argument that names `mesh.source`, the element and the value.
 void repair(TetMesh& mesh);
 
-/// The same for a mesh from files: throws MeshError that also names file and line.
+/// The same for a mesh from files, which other programs make as they do: vertices of tetrahedra at the same coordinates
+/// become one, of tetrahedra with the same four vertices one is kept, and flat ones are dropped if they are at most one
+/// in a hundred. Throws MeshError that also names file and line.
 void repair(TetMesh& mesh, const MeshOrigin& origin);
 
 /// Sum of the signed volumes [m^3].
