@@ -43,7 +43,7 @@ Json energy_summary(const std::vector<Real>& energies) {
           {"final", number(energies.back())}};
 }
 
-/// Of all bodies together; the source is that of the first.
+/// Of all bodies together; the source, and what was amiss with it, is that of the first.
 Json mesh_summary(const std::vector<SoftObject>& bodies) {
   Eigen::Index vertices = 0;
   std::size_t tetrahedra = 0, triangles = 0, edges = 0;
@@ -53,11 +53,10 @@ Json mesh_summary(const std::vector<SoftObject>& bodies) {
     triangles += body.mesh.drawn_triangles().size();
     edges += body.mesh.edges().size();
   }
-  return {{"source", bodies.front().mesh.source()},
-          {"vertices", vertices},
-          {"tetrahedra", tetrahedra},
-          {"triangles", triangles},
-          {"edges", edges}};
+  const BodyMesh& first = bodies.front().mesh;
+  return {{"source", first.source()}, {"repairs", first.is_shell() ? "" : to_text(first.solid().repairs)},
+          {"vertices", vertices},     {"tetrahedra", tetrahedra},
+          {"triangles", triangles},   {"edges", edges}};
 }
 
 /// What each batch holds at the end, and what came and went in the course of the run.
@@ -165,7 +164,8 @@ Json summarize(const std::vector<Figure>& figures, const RunOptions& options) {
   json["scene"] = options.scene;
   for (const char* key : {"world", "integrator"}) json[key] = nullptr;
   json["precision"] = bullet_precision();
-  json["mesh"] = {{"source", nullptr}, {"vertices", 0}, {"tetrahedra", 0}, {"triangles", 0}, {"edges", 0}};
+  json["mesh"] = {{"source", nullptr}, {"repairs", ""},  {"vertices", 0},
+                  {"tetrahedra", 0},   {"triangles", 0}, {"edges", 0}};
   json["seed"] = options.scene_options.seed;
   json["dt"] = nullptr;
   json["steps"] = 0;
@@ -199,8 +199,10 @@ std::string describe(const Json& summary, const std::vector<Fact>& facts) {
   const char* const elements = mesh["tetrahedra"] > 0 ? "tetrahedra" : "triangles";
   text << summary["scene"].get<std::string>() << ", " << summary["world"].get<std::string>() << " world, "
        << summary["precision"].get<std::string>() << ": " << mesh[elements] << ' ' << elements << " of "
-       << mesh["source"].get<std::string>() << '\n'
-       << "  " << summary["steps"] << " steps, " << shown(summary["ms_per_step"]["median"]) << " ms each, "
+       << mesh["source"].get<std::string>() << '\n';
+  if (const std::string repairs = mesh["repairs"].get<std::string>(); !repairs.empty())
+    text << "  in the file: " << repairs << '\n';
+  text << "  " << summary["steps"] << " steps, " << shown(summary["ms_per_step"]["median"]) << " ms each, "
        << shown(summary["substeps"]["mean"]) << " substeps, " << summary["retries"] << " retries\n"
        << "  energy [J]: " << shown(summary["energy"]["initial"]) << " at first, " << shown(summary["energy"]["final"])
        << " at the end, largest gain in a step " << shown(summary["largest_energy_gain"]) << '\n'
