@@ -120,6 +120,8 @@ class VtkReader {
 
   void read_header() {
     std::string magic = lower_case(text_.rest_of_line());
+    if (magic.starts_with('<'))
+      text_.fail("VTK's XML is not read: save it as legacy VTK, as ParaView and `meshio convert` do");
     std::erase(magic, ' ');
     if (!magic.starts_with("#vtkdatafileversion"))
       text_.fail("not a legacy VTK file: it does not begin with '# vtk DataFile Version'");
