@@ -17,14 +17,16 @@ class SplitSolid : public MeshFiles {};
 // their places and numbered at random: a Gmsh file.
 std::string mixed_block(int n, Random& random) {
   const int corners = (n + 1) * (n + 1) * (n + 1);
-  std::vector<int> number(static_cast<std::size_t>(corners + n * n * n));
+  const int places = corners + n * n * n;
+  std::vector<int> number(static_cast<unsigned>(places));
   std::iota(number.begin(), number.end(), 1);
   for (std::size_t i = number.size() - 1; i > 0; --i)
     std::swap(number[i], number[random.index(static_cast<unsigned>(i + 1))]);
   std::ostringstream nodes, elements;
   nodes.precision(17);
   const auto at = [&](int i, int j, int k) {
-    return number[static_cast<std::size_t>(i + (n + 1) * (j + (n + 1) * k))];
+    const int place = i + (n + 1) * (j + (n + 1) * k);
+    return number[static_cast<std::size_t>(place)];
   };
   const auto off = [&](int i) { return i == 0 || i == n ? i : i + random.uniform(-0.2, 0.2); };
   for (int k = 0; k <= n; ++k)

@@ -9,15 +9,15 @@
 namespace penalty {
 namespace {
 
-enum class Layout { one, two, four_zero, four_one };
+enum class Layout { unknown, one, two, four_zero, four_one };
 
 // What the Gmsh manual, section "MSH file format", says of an element type. All list their corners first.
 struct ElementType {
-  int nodes;
+  int nodes = 0;               // 0: nothing that is read
   std::optional<Solid> solid;  // none: a point, a line or a face
 };
 
-std::optional<ElementType> element_type(std::int64_t type) {
+ElementType element_type(std::int64_t type) {
   constexpr int lower[] = {0, 2, 3, 4, 0, 0, 0, 0, 3, 6, 9, 0, 0, 0, 0, 1, 8, 0, 0, 0, 9, 10, 12, 15, 15, 21, 4, 5, 6};
   if (type > 0 && type < 29 && lower[type] > 0) return ElementType{lower[type], std::nullopt};
   switch (type) {
@@ -64,7 +64,7 @@ std::optional<ElementType> element_type(std::int64_t type) {
     case 19:
       return ElementType{13, Solid::pyramid};
     default:
-      return std::nullopt;
+      return {};
   }
 }
 
@@ -117,7 +117,7 @@ class GmshReader {
   void require_format(std::string_view section) {
     if (section == "$NOD" || section == "$ELM")
       layout_ = Layout::one;
-    else if (!layout_)
+    else if (layout_ == Layout::unknown)
       text_.fail("found " + in_quotes(section) + " before $MeshFormat, which says how to read it");
   }
 
@@ -173,23 +173,23 @@ class GmshReader {
 
   void read_nodes() {
     begin_section();
-    if (*layout_ == Layout::one || *layout_ == Layout::two) {
+    if (layout_ == Layout::one || layout_ == Layout::two) {
       const std::int64_t nodes = text_.count("the number of nodes", 8);
       begin_section();
       add_nodes(nodes, 0);
     } else {
       const std::int64_t blocks = count("the number of node blocks", 8, 20);
-      for (int k = 0; k < (*layout_ == Layout::four_one ? 3 : 1); ++k) size("a total");  // the blocks say the same
+      for (int k = 0; k < (layout_ == Layout::four_one ? 3 : 1); ++k) size("a total");  // the blocks say the same
       for (std::int64_t block = 0; block < blocks; ++block) {
         text_.within("node block", block);
         const std::int64_t first = integer("the entity"), second = integer("the entity");  // dimension and tag
-        const std::int64_t dimension = *layout_ == Layout::four_one ? first : second;
+        const std::int64_t dimension = layout_ == Layout::four_one ? first : second;
         const bool is_parametric = integer("the parametric flag") != 0;
         const std::int64_t nodes = count("the number of nodes", 8, 28);
         const std::int64_t parameters = is_parametric ? dimension : 0;
         if (parameters < 0 || parameters > 3)
           text_.fail("the entity dimension is " + std::to_string(parameters) + ", not 0 to 3");
-        *layout_ == Layout::four_one ? add_tagged_nodes(nodes, parameters) : add_nodes(nodes, parameters);
+        layout_ == Layout::four_one ? add_tagged_nodes(nodes, parameters) : add_nodes(nodes, parameters);
       }
     }
     text_.within({});
@@ -223,7 +223,8 @@ class GmshReader {
 
   void read_elements() {
     begin_section();
-    switch (*layout_) {
+    switch (layout_) {
+      case Layout::unknown:  // `require_format` has seen to that
       case Layout::one:
       case Layout::two:
         is_binary_ ? read_elements_in_runs() : read_elements_in_lines();
@@ -243,13 +244,13 @@ class GmshReader {
       text_.within("element", i);
       const std::int64_t tag = text_.integer("the number of the element");
       text_.within("element", tag);
-      const std::optional<ElementType> type = read_type();
-      if (!type) refuse_type();
-      if (type->solid) {
-        const std::int64_t tags = *layout_ == Layout::one ? 3 : text_.integer("the number of tags");
+      const ElementType type = read_type();
+      if (type.nodes == 0) refuse_type();
+      if (type.solid) {
+        const std::int64_t tags = layout_ == Layout::one ? 3 : text_.integer("the number of tags");
         for (std::int64_t k = 0; k < tags; ++k) text_.integer("a tag");
       }
-      add_element(*type, tag, 4);
+      add_element(type, tag, 4);
     }
   }
 
@@ -259,42 +260,42 @@ class GmshReader {
     begin_section();
     for (std::int64_t read = 0; read < elements;) {
       text_.within("element", read);
-      const std::optional<ElementType> type = read_type();
+      const ElementType type = read_type();
       const std::int64_t run = integer("the number of elements of this type"), tags = integer("the number of tags");
       if (run <= 0 || run > elements - read)
         text_.fail("a run of " + std::to_string(run) + " elements, where " + std::to_string(elements - read) +
                    " are left");
-      if (!type) refuse_type();
+      if (type.nodes == 0) refuse_type();
       if (tags < 0) text_.fail("the number of tags is " + std::to_string(tags) + ", below zero");
       for (std::int64_t i = 0; i < run; ++i, ++read) {
         const std::int64_t tag = integer("the number of the element");
         text_.within("element", tag);
         text_.bytes(4 * static_cast<std::size_t>(tags), "the tags");
-        add_element(*type, tag, 4);
+        add_element(type, tag, 4);
       }
     }
   }
 
   void read_elements_in_blocks() {
-    const bool is_four_one = *layout_ == Layout::four_one;
+    const bool is_four_one = layout_ == Layout::four_one;
     const std::int64_t blocks = count("the number of element blocks", 8, 20);
     for (int k = 0; k < (is_four_one ? 3 : 1); ++k) size("a total");
     for (std::int64_t block = 0; block < blocks; ++block) {
       text_.within("element block", block);
       integer("the entity");
       integer("the entity");
-      const std::optional<ElementType> type = read_type();
+      const ElementType type = read_type();
       const std::int64_t elements = count("the number of elements", 4, 8);
-      if (!type && elements > 0) refuse_type();
+      if (type.nodes == 0 && elements > 0) refuse_type();
       for (std::int64_t i = 0; i < elements; ++i) {
         const std::int64_t tag = is_four_one ? size("the number of the element") : integer("the number of the element");
         text_.within("element", tag);
-        add_element(*type, tag, is_four_one ? 8 : 4);
+        add_element(type, tag, is_four_one ? 8 : 4);
       }
     }
   }
 
-  std::optional<ElementType> read_type() { return element_type(type_ = integer("the element type")); }
+  ElementType read_type() { return element_type(type_ = integer("the element type")); }
 
   [[noreturn]] void refuse_type() const {
     text_.fail("element type " + std::to_string(type_) + " is not read: save the mesh with elements of first order");
@@ -320,7 +321,7 @@ class GmshReader {
 
   TextCursor text_;
   RawMesh mesh_;
-  std::optional<Layout> layout_;
+  Layout layout_ = Layout::unknown;
   std::int64_t type_ = 0;  // of the element read last
   bool is_binary_ = false, is_swapped_ = false;
 };
