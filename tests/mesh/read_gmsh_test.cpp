@@ -77,7 +77,7 @@ TEST_F(ReadGmsh, NamesFileLineElementAndValue) {
   EXPECT_EQ(complaint(replaced(gmsh_41, "0 0 -1\n", "0 0 nan\n")), "a.msh:21: vertex 9: coordinate z is nan");
   EXPECT_EQ(complaint(replaced(gmsh_41, "3 1 3 2 9", "3 1 3 2 10")), "a.msh:29: tetrahedron 3: there is no vertex 10");
   EXPECT_EQ(complaint(replaced(replaced(gmsh_2, "2 4 2", "2 3 2"), "3 4 2", "3 3 2")),
-            "a.msh: no solids, only points, lines and faces (3): fill them with tetrahedra (gmsh -3), or give a closed "
+            "a.msh: no solids, only points, lines and faces (3): fill them with tetrahedra (TetGen), or give a closed "
             "surface as .obj, .ply or .stl");
 }
 

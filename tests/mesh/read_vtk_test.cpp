@@ -90,7 +90,7 @@ TEST_F(ReadVtk, NamesFileLineElementAndValue) {
             "a.vtk:16: cell 0: type 42 is not read: save the mesh with cells of first or second order");
   EXPECT_EQ(complaint(replaced(vtk_ascii, "5\n10", "10\n10")), "a.vtk:17: cell 1: a tetrahedron with 3 corners, not 4");
   EXPECT_EQ(complaint(replaced(vtk_ascii, "10\n5\n10\n", "9\n5\n9\n")),
-            "a.vtk: no solids, only points, lines and faces (3): fill them with tetrahedra (gmsh -3), or give a closed "
+            "a.vtk: no solids, only points, lines and faces (3): fill them with tetrahedra (TetGen), or give a closed "
             "surface as .obj, .ply or .stl");
 }
 

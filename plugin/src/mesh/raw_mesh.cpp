@@ -81,7 +81,7 @@ void RawMesh::add(Solid solid, std::span<const std::int64_t> corners, std::int64
 TetMesh RawMesh::finish(std::string source) && {
   if (solids_.empty() && skipped_ > 0)
     throw MeshError(source + ": no solids, only points, lines and faces (" + std::to_string(skipped_) +
-                    "): fill them with tetrahedra (gmsh -3), or give a closed surface as .obj, .ply or .stl");
+                    "): fill them with tetrahedra (TetGen), or give a closed surface as .obj, .ply or .stl");
   TetMesh mesh;
   mesh.source = std::move(source);
   mesh.vertices =

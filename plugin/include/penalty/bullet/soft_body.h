@@ -65,8 +65,8 @@ struct BodyFieldOptions {
 /// Positions of the nodes are the rest shape: take the field before the body is deformed. A link gives its edge its rest
 /// length, and its m_kLST the share of the material's stiffness; that of an edge inside a solid does nothing. Links that
 /// Bullet makes against bending (generateBendingConstraints) are left out where hinges stand for them, and so are faces
-/// without an area. The mass stays what it is. Throws std::invalid_argument that names the body's node, link, face or tetrahedron, or the number out of
-/// range.
+/// without an area. The mass stays what it is. Throws std::invalid_argument that names the body's node, link, face or
+/// tetrahedron, or the number out of range.
 PotentialField make_field(const btSoftBody& body, const Material& material, const BodyFieldOptions& options = {});
 
 }  // namespace penalty
