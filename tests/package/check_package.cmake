@@ -64,8 +64,8 @@ elseif(STEP STREQUAL "find_package")
 elseif(STEP STREQUAL "build_tree")
   use_package(${BUILD})
 elseif(STEP STREQUAL "subproject")
-  # Part of a project of other habits, which fetches us, wants shared libraries and compiles each from a single source; and
-  # the installation of those.
+  # Part of a project of other habits, which fetches us, wants shared libraries and compiles each from a single source, perhaps by
+  # another compiler; and the installation of those.
   list(GET PRECISIONS 0 PRECISIONS)  # the whole library is compiled again: one precision, and not optimised
   set(module bullet)
   set(target bullet_penalty)
