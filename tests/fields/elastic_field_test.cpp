@@ -184,6 +184,71 @@ TEST(Material, StiffnessScalesWithYoungsModulus) {
   EXPECT_NEAR(hard / soft, 1e9, 1e-3);
 }
 
+// A bar of 0.03 x 0.03 x 1 m, its lower half of one material, its upper half of another.
+PotentialField bar(const Material& lower, const Material& upper, ElasticModel model) {
+  const TetMesh mesh = make_box({0.03, 0.03, 1}, {2, 2, 66});
+  Materials materials{.kinds = {lower, upper}, .kind_of = {}};
+  for (const Tetrahedron& t : mesh.tetrahedra)
+    materials.kind_of.push_back(mesh.vertices(Eigen::all, t).row(2).mean() < 0.5 ? 0 : 1);
+  return make_elastic_field(mesh.vertices, mesh.tetrahedra, materials, model);
+}
+
+// Where they meet, the softer one cannot contract as it would, over a width or so: the bar is a little too stiff.
+TEST(Materials, OfTwoHalvesOfABarActAsSpringsInSeries) {
+  const Material soft{.young = 1e5, .poisson = 0.35};
+  for (const ElasticModel model :
+       {ElasticModel::neo_hookean, ElasticModel::springs_volumes, ElasticModel::springs_areas_volumes})
+    for (const Material& stiff : {Material{.young = 1e6, .poisson = 0.3}, Material{.young = 1e8, .poisson = 0.35}}) {
+      SCOPED_TRACE(Material::name_of(model) + std::string(", ") + std::to_string(stiff.young));
+      // On this mesh springs have moduli of their own along the bar.
+      const Real first = measured_young(bar(soft, soft, model)), second = measured_young(bar(stiff, stiff, model));
+      const Real ratio = measured_young(bar(soft, stiff, model)) * (1 / first + 1 / second) / 2;
+      RecordProperty("times series", std::to_string(ratio));
+      EXPECT_GT(ratio, 1);
+      EXPECT_LT(ratio, 1.01);
+    }
+  const Material one{.young = 2, .poisson = 0}, other{.young = 300, .poisson = 0};  // contract not at all
+  EXPECT_NEAR(measured_young(bar(one, other, ElasticModel::neo_hookean)) / (0.03 * 0.03), 2 / (1.0 / 2 + 1.0 / 300),
+              1e-6);
+}
+
+TEST(Materials, ShareTheEdgesBetweenThem) {
+  // Two tetrahedra on one face: an edge of it stands for a sixth of both, any other of one.
+  Eigen::Matrix3Xd vertices(3, 5);
+  vertices << 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, -2;
+  const std::vector<Tetrahedron> tetrahedra{{0, 1, 2, 3}, {0, 2, 1, 4}};
+  const Material soft{.young = 1e5, .poisson = 0.25, .damping = 0.01}, stiff{.young = 3e5, .poisson = 0.4};
+  const PotentialField field = make_elastic_field(vertices, tetrahedra, Materials{{soft, stiff}, {0, 1}});
+  const auto k = [](const Material& m, Real volume) { return 15 * m.young / (2 * (1 + m.poisson)) * volume / 6; };
+  const ElementBatch& springs = field.batch<Length>();
+  const std::vector<Edge> edges = edges_of(tetrahedra);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const bool of_soft = edges[e][1] != 4, of_stiff = edges[e][1] != 3;
+    EXPECT_NEAR(springs.stiffness(static_cast<int>(e)), of_soft * k(soft, 1.0 / 6) + of_stiff * k(stiff, 1.0 / 3),
+                1e-9);
+  }
+  EXPECT_EQ(field.batch<TetrahedronVolume>().num_elements(), 1u);  // the soft one has the ratio of its springs
+  EXPECT_TRUE(field.damps());
+}
+
+TEST(Materials, NameWhatIsWrong) {
+  const TetMesh mesh = make_box({1, 1, 1}, {1, 1, 1});
+  const auto refusal = [&](const Materials& materials) -> std::string {
+    try {
+      make_elastic_field(mesh.vertices, mesh.tetrahedra, materials);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::size_t size = mesh.tetrahedra.size();
+  std::vector<int> all(size, 0);
+  EXPECT_EQ(refusal({{Material{}}, {0}}), "materials: they are those of 1 tetrahedra, not of " + std::to_string(size));
+  EXPECT_EQ(refusal({{}, all}), "materials: tetrahedron 0 is of material 0, there are 0");
+  EXPECT_EQ(refusal({{Material{}, Material{.young = -1}}, all}),
+            "material 1: Young's modulus is -1, must be positive and finite [Pa]");
+}
+
 TEST(SameStiffnessForAll, GrowsStifferAsTheMeshIsRefined) {
   // Of half the size, there are eight times as many elements that each hold the same energy at a strain.
   Real last = 0;

@@ -11,6 +11,20 @@ std::vector<Real> scaled(std::vector<Real> shares, Real density) {
   return shares;
 }
 
+Materials throughout(const Material& material, std::size_t tetrahedra) {
+  return {.kinds = {material}, .kind_of = std::vector<int>(tetrahedra, 0)};
+}
+
+std::vector<Real> volumes_at_rest(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra) {
+  std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
+  for (std::size_t t = 0; t < volumes.size(); ++t) {
+    volumes[t] = std::abs(volumes[t]);
+    if (!(volumes[t] > 0))
+      throw std::invalid_argument("elastic field: tetrahedron " + std::to_string(t) + " has no volume at rest");
+  }
+  return volumes;
+}
+
 void set_damping(const PotentialField& field, Real time) {
   for (const auto& potential : field.potentials()) static_cast<ElementBatch&>(*potential).set_damping_time(time);
 }
@@ -37,6 +51,22 @@ std::vector<Hinge> folds_of(std::span<const Triangle> triangles) {
 
 }  // namespace
 
+void Materials::check(std::size_t tetrahedra, ElasticModel model) const {
+  if (kind_of.size() != tetrahedra)
+    throw std::invalid_argument("materials: they are those of " + std::to_string(kind_of.size()) +
+                                " tetrahedra, not of " + std::to_string(tetrahedra));
+  for (std::size_t t = 0; t < tetrahedra; ++t)
+    if (kind_of[t] < 0 || static_cast<std::size_t>(kind_of[t]) >= kinds.size())
+      throw std::invalid_argument("materials: tetrahedron " + std::to_string(t) + " is of material " +
+                                  std::to_string(kind_of[t]) + ", there are " + std::to_string(kinds.size()));
+  for (std::size_t k = 0; k < kinds.size(); ++k) try {
+      kinds[k].check(model);
+    } catch (const std::invalid_argument& error) {
+      if (kinds.size() == 1) throw;
+      throw std::invalid_argument("material " + std::to_string(k) + std::string(error.what()).substr(8));  // "material"
+    }
+}
+
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                   Real stiffness) {
   PotentialField field(vertices);
@@ -47,42 +77,85 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
 
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                   const Material& material, ElasticModel model) {
-  material.check(model);
+  return make_elastic_field(vertices, tetrahedra, throughout(material, tetrahedra.size()), model);
+}
+
+PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
+                                  const Materials& materials, ElasticModel model) {
+  materials.check(tetrahedra.size(), model);
   PotentialField field(vertices);
-  std::vector<Real> volumes = signed_volumes(vertices, tetrahedra);
-  for (std::size_t t = 0; t < volumes.size(); ++t) {
-    volumes[t] = std::abs(volumes[t]);
-    if (!(volumes[t] > 0))
-      throw std::invalid_argument("elastic field: tetrahedron " + std::to_string(t) + " has no volume at rest");
-  }
+  const std::vector<Real> volumes = volumes_at_rest(vertices, tetrahedra);
+  const bool damps =
+      std::any_of(materials.kinds.begin(), materials.kinds.end(), [](const Material& m) { return m.damping > 0; });
+  // Adds a batch. A tetrahedron brings `density(its material)` times its volume to the stiffness of the elements that
+  // `share` divides it among, and its damping with that.
+  const auto add = [&](const auto& density, const auto& share, const auto& add_batch) {
+    std::vector<Real> parts;
+    parts.reserve(volumes.size());
+    for (std::size_t t = 0; t < volumes.size(); ++t) parts.push_back(density(materials.of(t)) * volumes[t]);
+    const std::vector<Real> stiffnesses = share(parts);
+    ElementBatch& batch = add_batch(stiffnesses);
+    if (!damps) return;
+    for (std::size_t t = 0; t < volumes.size(); ++t) parts[t] *= materials.of(t).damping;
+    const std::vector<Real> damped = share(parts);
+    for (std::size_t e = 0; e < damped.size(); ++e)
+      if (damped[e] > 0) batch.set_damping_time(static_cast<int>(e), damped[e] / stiffnesses[e]);
+  };
+  const auto as_they_are = [](std::vector<Real> parts) { return parts; };
+
   if (model == ElasticModel::neo_hookean) {
-    field.add(StableNeoHookean::with_ratio(material.lame_lambda() / material.lame_mu()), tetrahedra,
-              scaled(volumes, material.lame_mu()));
-  } else {
-    const std::vector<Edge> edges = edges_of(tetrahedra);
-    field.add<Length>(edges,
-                      scaled(edge_volume_shares(edges, tetrahedra, volumes), material.length_stiffness_density(model)));
-    if (material.area_stiffness_density(model) > 0) {
-      const std::vector<Triangle> faces = faces_of(tetrahedra);
-      field.add<TriangleArea>(
-          faces, scaled(face_volume_shares(faces, tetrahedra, volumes), material.area_stiffness_density(model)));
-    }
-    // The least Poisson ratio, computed in floating point, may leave a volume term of either sign in the last digits.
-    const Real density = material.volume_stiffness_density(model);
-    if (density > 1e-12 * material.young) field.add<TetrahedronVolume>(tetrahedra, scaled(volumes, density));
+    std::vector<StableNeoHookean> prototypes;
+    prototypes.reserve(volumes.size());
+    for (std::size_t t = 0; t < volumes.size(); ++t)
+      prototypes.push_back(StableNeoHookean::with_ratio(materials.of(t).lame_lambda() / materials.of(t).lame_mu()));
+    add([](const Material& m) { return m.lame_mu(); }, as_they_are,
+        [&](const auto& k) -> ElementBatch& { return field.add<StableNeoHookean>(prototypes, tetrahedra, k); });
+    return field;
   }
-  if (material.damping > 0) set_damping(field, material.damping);
+  const std::vector<Edge> edges = edges_of(tetrahedra);
+  add([&](const Material& m) { return m.length_stiffness_density(model); },
+      [&](const std::vector<Real>& parts) { return edge_volume_shares(edges, tetrahedra, parts); },
+      [&](const auto& k) -> ElementBatch& { return field.add<Length>(edges, k); });
+  if (model == ElasticModel::springs_areas_volumes) {
+    const std::vector<Triangle> faces = faces_of(tetrahedra);
+    add([&](const Material& m) { return m.area_stiffness_density(model); },
+        [&](const std::vector<Real>& parts) { return face_volume_shares(faces, tetrahedra, parts); },
+        [&](const auto& k) -> ElementBatch& { return field.add<TriangleArea>(faces, k); });
+  }
+  // The least Poisson ratio, computed in floating point, may leave a volume term of either sign in the last digits.
+  std::vector<std::size_t> resisting;
+  std::vector<Tetrahedron> stencils;
+  for (std::size_t t = 0; t < volumes.size(); ++t)
+    if (materials.of(t).volume_stiffness_density(model) > 1e-12 * materials.of(t).young) {
+      resisting.push_back(t);
+      stencils.push_back(tetrahedra[t]);
+    }
+  if (!resisting.empty())
+    add([&](const Material& m) { return m.volume_stiffness_density(model); },
+        [&](const std::vector<Real>& parts) {
+          std::vector<Real> kept;
+          kept.reserve(resisting.size());
+          for (const std::size_t t : resisting) kept.push_back(parts[t]);
+          return kept;
+        },
+        [&](const auto& k) -> ElementBatch& { return field.add<TetrahedronVolume>(stencils, k); });
   return field;
 }
 
 PotentialField make_recovering_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                      const Material& material, ElasticModel model, const PhaseThresholds& thresholds) {
-  material.check(model);
-  // mu = E / 2 (1 + nu) stays; without lambda nu is 0.
-  Material soft = material;
-  soft.young = 2 * material.lame_mu();
-  soft.poisson = 0;
-  PotentialField field = make_elastic_field(vertices, tetrahedra, material, model);
+  return make_recovering_field(vertices, tetrahedra, throughout(material, tetrahedra.size()), model, thresholds);
+}
+
+PotentialField make_recovering_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
+                                     const Materials& materials, ElasticModel model,
+                                     const PhaseThresholds& thresholds) {
+  PotentialField field = make_elastic_field(vertices, tetrahedra, materials, model);
+  Materials soft = materials;
+  for (Material& material : soft.kinds) {  // mu = E / 2 (1 + nu) stays; without lambda nu is 0
+    material.young = 2 * material.lame_mu();
+    material.poisson = 0;
+  }
   field.add_soft_phase(tetrahedra, make_elastic_field(vertices, tetrahedra, soft, ElasticModel::neo_hookean),
                        thresholds);
   return field;

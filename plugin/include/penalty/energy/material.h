@@ -2,6 +2,7 @@
 #pragma once
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "penalty/math/text.h"
 
@@ -84,6 +85,17 @@ struct Material {
   static constexpr Real share(ElasticModel model) {
     return model == ElasticModel::springs_areas_volumes ? area_share : 0;
   }
+};
+
+/// What the tetrahedra of a body are made of, one by one: `penalty/mesh/regions.h` takes it from the regions of a mesh.
+struct Materials {
+  std::vector<Material> kinds;
+  std::vector<int> kind_of;  // of tetrahedron t: kinds[kind_of[t]]
+
+  const Material& of(std::size_t tetrahedron) const { return kinds[kind_of[tetrahedron]]; }
+
+  /// Throws std::invalid_argument unless each of `tetrahedra` has one of the materials, and these are good for `model`.
+  void check(std::size_t tetrahedra, ElasticModel model) const;
 };
 
 }  // namespace penalty

@@ -16,11 +16,19 @@ PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<co
 PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                   const Material& material, ElasticModel model = ElasticModel::springs_volumes);
 
+/// The same of several materials. Edges and faces stand for volume on both sides of a boundary between two: their
+/// stiffness and damping are those of their parts together. Throws std::invalid_argument as `Materials::check`, too.
+PotentialField make_elastic_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
+                                  const Materials& materials, ElasticModel model = ElasticModel::springs_volumes);
+
 /// `make_elastic_field` of the same arguments, but while the body is far from its rest shape it is of the neo-Hookean
 /// material with the same shear modulus and no resistance to changes of volume beyond that, see
 /// `PotentialField::add_soft_phase`: finds back from any start, whatever the material.
 PotentialField make_recovering_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
                                      const Material& material, ElasticModel model = ElasticModel::neo_hookean,
+                                     const PhaseThresholds& thresholds = {});
+PotentialField make_recovering_field(const Eigen::Matrix3Xd& vertices, std::span<const Tetrahedron> tetrahedra,
+                                     const Materials& materials, ElasticModel model = ElasticModel::neo_hookean,
                                      const PhaseThresholds& thresholds = {});
 
 /// A thin sheet of a material: cloth, the skin of a balloon, foil. Springs on the edges, areas of the triangles, hinges

@@ -64,6 +64,20 @@ class PotentialField {
                               [&](const Points<Kind::num_points>& rest) { return prototype.at_rest(rest); });
   }
 
+  /// The same with a prototype of its own for each stencil: `add<Kind>(prototypes, stencils, stiffnesses)`.
+  template <ElementKind Kind>
+  Batch<Kind>& add(std::type_identity_t<std::span<const Kind>> prototypes,
+                   std::type_identity_t<std::span<const StencilOf<Kind>>> stencils,
+                   const std::vector<Real>& stiffnesses, std::string name = {}) {
+    if (prototypes.size() != stencils.size())
+      throw std::invalid_argument((name.empty() ? std::string(Kind::name) : name) + ": " +
+                                  std::to_string(prototypes.size()) + " prototypes for " +
+                                  std::to_string(stencils.size()) + " stencils");
+    auto next = prototypes.begin();
+    return add_elements<Kind>(stencils, stiffnesses, std::move(name),
+                              [&](const Points<Kind::num_points>& rest) { return (next++)->at_rest(rest); });
+  }
+
   /// Adds any potential over the same particles.
   Potential& add(std::unique_ptr<Potential> potential);
 
