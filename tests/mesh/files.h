@@ -212,7 +212,8 @@ inline const std::string gmsh_41 =
 enum class GmshNumbers { text, binary, swapped };
 
 /// The mesh, between a point, a triangle and a line that are none of it, in the layout of a Gmsh version: "1", "2.2",
-/// "4", "4.1". Its nodes have the numbers 11 to 15.
+/// "4", "4.1". Its nodes have the numbers 11 to 15. Tetrahedra are in the physical group 6, "rubber", and from version 4 on
+/// in 8, "all of it", the triangle in 5, "left side"; until version 2 point and line are in a group 5 of their dimension.
 inline std::string gmsh_file(const std::string& version, GmshNumbers numbers) {
   const bool is_text = numbers == GmshNumbers::text, is_old = version == "1", is_4 = version[0] == '4';
   const bool is_41 = version == "4.1";
@@ -243,7 +244,21 @@ inline std::string gmsh_file(const std::string& version, GmshNumbers numbers) {
   if (!is_old) {
     file = "$MeshFormat\n" + version + (is_text ? " 0 8\n" : " 1 8\n");
     if (!is_text) put_int(1), file += "\n";
-    file += "$EndMeshFormat\n";
+    file +=
+        "$EndMeshFormat\n$PhysicalNames\n3\n2 5 \"left side\"\n3 6 \"rubber\"\n3 8 \"all of it\"\n$EndPhysicalNames\n";
+  }
+  if (is_4) {  // a surface and a volume, both with the number 7
+    file += "$Entities\n";
+    for (const int count : {0, 0, 1, 1}) put_size(count);
+    end_line();
+    for (const bool is_volume : {false, true}) {
+      put_int(7);
+      for (const double side : {0, 0, -1, 1, 1, 1}) put(side);
+      put_size(is_volume ? 2 : 1), put_int(is_volume ? 6 : 5);
+      if (is_volume) put_int(-8);
+      put_size(1), put_int(-7), end_line();
+    }
+    end_section("$EndEntities");
   }
   file += is_old ? "$NOD\n" : "$Nodes\n";
   const auto put_place = [&](int v) {
@@ -282,18 +297,19 @@ inline std::string gmsh_file(const std::string& version, GmshNumbers numbers) {
   }
   int number = 0;
   for (const auto& [type, nodes] : elements) {
+    const int physical = type == 4 ? 6 : 5;
     ++number;
     if (is_4) {
-      put_int(3), put_int(7), put_int(type), put_size(1), end_line();
+      put_int(is_41 ? 3 : 7), put_int(is_41 ? 7 : 3), put_int(type), put_size(1), end_line();
       put_tag(number);
     } else if (is_text) {
       put_int(number), put_int(type);
       if (is_old)
-        put_int(1), put_int(7), put_int(static_cast<int>(nodes.size()));
+        put_int(physical), put_int(7), put_int(static_cast<int>(nodes.size()));
       else
-        put_int(2), put_int(1), put_int(7);
+        put_int(2), put_int(physical), put_int(7);
     } else {
-      put_int(type), put_int(1), put_int(2), put_int(number), put_int(1), put_int(7);
+      put_int(type), put_int(1), put_int(2), put_int(number), put_int(physical), put_int(7);
     }
     for (const int node : nodes) put_tag(node);
     end_line();
@@ -330,6 +346,16 @@ inline const std::string tetgen_ele =
     "1  1 2 3 4  1\n"  // 2
     "2  1 3 2 5  2\n"  // 3
     "# end\n";         // 4
+
+/// Groups in a line: "name: 0 1 2; other: 3".
+inline std::string to_text(const std::vector<MeshGroup>& groups) {
+  std::string text;
+  for (const auto& [name, members] : groups) {
+    text += (text.empty() ? "" : "; ") + name + ":";
+    for (const int member : members) text += " " + std::to_string(member);
+  }
+  return text;
+}
 
 /// The mesh above, whatever the file called its vertices.
 inline void expect_two_tetrahedra(const TetMesh& mesh) {

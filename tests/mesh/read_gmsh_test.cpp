@@ -27,6 +27,42 @@ TEST_F(ReadGmsh, TakesEveryVersionAsTextAndInEitherByteOrder) {
     }
 }
 
+TEST_F(ReadGmsh, KeepsPhysicalGroupsAndTheirNames) {
+  for (const char* version : {"1", "2.2", "4", "4.1"})
+    for (const GmshNumbers numbers : {GmshNumbers::text, GmshNumbers::binary, GmshNumbers::swapped}) {
+      if (version[0] == '1' && numbers != GmshNumbers::text) continue;
+      SCOPED_TRACE(std::string(version) + (numbers == GmshNumbers::text ? "" : " binary"));
+      const TetMesh mesh = read(gmsh_file(version, numbers));
+      EXPECT_EQ(to_text(mesh.regions), version[0] == '1'   ? "physical 6: 0 1"
+                                       : version[0] == '2' ? "rubber: 0 1"
+                                                           : "rubber: 0 1; all of it: 0 1");
+      EXPECT_EQ(to_text(mesh.vertex_sets), version[0] == '1'   ? "physical 5: 0 1 2 3 4"
+                                           : version[0] == '2' ? "physical 5: 0 3 4; left side: 0 1 2"
+                                                               : "left side: 0 1 2");
+    }
+}
+
+TEST_F(ReadGmsh, KeepsVolumesOfTheModelWhereThereAreNoPhysicalGroups) {
+  const std::string without = replaced(replaced(gmsh_2, "2 4 2 1 1", "2 4 2 0 1"), "3 4 2 1 1", "3 4 2 0 1");
+  EXPECT_EQ(to_text(read(without).regions), "");
+  EXPECT_EQ(to_text(read(replaced(without, "3 4 2 0 1", "3 4 2 0 9")).regions), "volume 1: 0; volume 9: 1");
+  EXPECT_EQ(to_text(read(replaced(without, "3 4 2 0 1", "3 4 2 1 9")).regions), "body: 1");
+}
+
+TEST_F(ReadGmsh, PutsTheSolidsOfAnElementIntoItsGroup) {  // six tetrahedra a hexahedron at most
+  const TetMesh mesh = read(gmsh_prisms);
+  EXPECT_EQ(to_text(mesh.regions), "");
+  const TetMesh grouped = read(replaced(replaced(gmsh_prisms, "1 6 0 ", "1 6 1 3 "), "2 6 0 ", "2 6 1 -4 "));
+  EXPECT_EQ(to_text(grouped.regions), "physical 3: 0 1 2; physical 4: 3 4 5");
+}
+
+TEST_F(ReadGmsh, NamesAnEntityOfTooManyGroups) {
+  std::string groups = "101";
+  for (int k = 0; k < 101; ++k) groups += " 1";
+  EXPECT_EQ(complaint(replaced(gmsh_41, "1 1 1 0 0\n", "1 1 1 " + groups + " 0\n")),
+            "a.msh:6: entity 0: it is in 101 physical groups, more than 100");
+}
+
 TEST_F(ReadGmsh, TakesLineEndsOfOtherSystemsAndByteOrderMarks) {
   for (const char* line_end : {"\r\n", "\r"}) {
     std::string text = "\xef\xbb\xbf";
@@ -52,6 +88,7 @@ TEST_F(ReadGmsh, TakesElementsThatStandInSeveralGroupsOnce) {
   const std::string text = replaced(replaced(gmsh_2, "\n3\n1 2 2", "\n4\n1 2 2"), "3 4 2 1 1 10 20 30 7",
                                     "3 4 2 1 1 10 20 30 7\n3 4 2 2 1 10 20 30 7");
   expect_two_tetrahedra(read(text));
+  EXPECT_EQ(to_text(read(text).regions), "body: 0 1; physical 2: 1");
   EXPECT_EQ(to_text(read(text).repairs), "dropped 1 doubled or flat tetrahedron");
 }
 
@@ -96,7 +133,7 @@ TEST_F(ReadGmsh, NamesBrokenStructure) {
   EXPECT_EQ(complaint(gmsh_2.substr(0, gmsh_2.find("$Elements"))), "a.msh:16: the section $Elements is missing");
   EXPECT_EQ(complaint(gmsh_2.substr(0, gmsh_2.find("$Nodes"))), "a.msh:8: the section $Nodes is missing");
   EXPECT_EQ(complaint(gmsh_2.substr(0, gmsh_2.find("$EndPhysical"))),
-            "a.msh:7: the file ends within the section '$PhysicalNames'");
+            "a.msh:7: the file ends where $EndPhysicalNames should stand");
   EXPECT_EQ(complaint(gmsh_2.substr(0, gmsh_2.find("3 4 2"))),
             "a.msh:20: element 2: the file ends where the number of the element should stand");
 }

@@ -25,6 +25,17 @@ TEST_F(ReadTetgen, CountsFromZeroToo) {
       read("5 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n4 0 0 -1\n", "2 4 0\n0 0 1 2 3\n1 0 2 1 4\n"));
 }
 
+TEST_F(ReadTetgen, KeepsRegionsAndMarkers) {
+  const TetMesh mesh = read(tetgen_node, tetgen_ele);
+  EXPECT_EQ(to_text(mesh.regions), "region 1: 0; region 2: 1");
+  EXPECT_EQ(to_text(mesh.vertex_sets), "marker 1: 1");
+  const TetMesh other = read(replaced(tetgen_node, "5  0 0 -1 7.5 0", "5, 0, 0, -1, 7.5, -3"),
+                             "2 10 1\n1 1 2 3 4 5 5 5 5 5 5 2.5\n2 1 3 2 5 4 4 4 4 4 4 2.5\n");
+  EXPECT_EQ(to_text(other.regions), "region 2.5: 0 1");
+  EXPECT_EQ(to_text(other.vertex_sets), "marker 1: 1; marker -3: 4");
+  EXPECT_EQ(to_text(read(tetgen_node, replaced(tetgen_ele, "2 4 1", "2 4 0")).regions), "");  // as the heading says
+}
+
 TEST_F(ReadTetgen, TakesCornersOfTenNodeTetrahedra) {
   expect_two_tetrahedra(read(tetgen_node, "2 10 0\n1 1 2 3 4 5 5 5 5 5 5\n2 1 3 2 5 4 4 4 4 4 4\n"));
 }

@@ -41,6 +41,54 @@ TEST_F(ReadVtk, TakesCornersOfSecondOrderTetrahedra) {
   expect_two_tetrahedra(read(text));
 }
 
+TEST_F(ReadVtk, KeepsWholeNumbersOnCellsAndPointsAsGroups) {
+  const TetMesh mesh = read(vtk_ascii +
+                            "CELL_DATA 3\nSCALARS material%20id int 1\nLOOKUP_TABLE default\n4 2 -1\n"
+                            "FIELD FieldData 2\nheat 1 3 double\n1.5 2 3\nsides 2 3 int\n1 2 3 4 5 6\n"
+                            "VECTORS flow float\n1 0 0 1 0 0 1 0 0\n"
+                            "POINT_DATA 5\nSCALARS fixed unsigned_char\nLOOKUP_TABLE default\n0 0 1 0 7\n"
+                            "SCALARS half float\nLOOKUP_TABLE default\n1 1 1 1 1\n"
+                            "SCALARS whole float\nLOOKUP_TABLE default\n1 1 1 2 0\n");
+  expect_two_tetrahedra(mesh);
+  EXPECT_EQ(to_text(mesh.regions), "material id 4: 0; material id -1: 1");
+  EXPECT_EQ(to_text(mesh.vertex_sets), "material id 2: 0 1 2; fixed 1: 2; fixed 7: 4; whole 1: 0 1 2; whole 2: 3");
+  EXPECT_EQ(to_text(read(vtk_offsets).regions), "heat 1: 0; heat 3: 1");  // whole numbers, if of a floating-point type
+  EXPECT_EQ(
+      to_text(
+          read(vtk_ascii + "CELL_DATA 3\nSCALARS id long\nLOOKUP_TABLE t\n1 2 3\nLOOKUP_TABLE t 1\n0 0 0 0\n").regions),
+      "id 1: 0; id 3: 1");
+}
+
+TEST_F(ReadVtk, KeepsGroupsOfBinaryFiles) {
+  const auto with = [](const char* type, const std::string& values) {
+    return vtk_binary() + "CELL_DATA 2\nFIELD FieldData 1\nregion 1 2 " + type + "\n" + values + "\n";
+  };
+  const auto both = [](auto value) { return big_endian(value) + big_endian(static_cast<decltype(value)>(3)); };
+  EXPECT_EQ(to_text(read(with("int", both(std::int32_t{-2}))).regions), "region -2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("vtkIdType", both(std::int32_t{-2}))).regions), "region -2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("unsigned_char", both(std::uint8_t{254}))).regions), "region 254: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("char", both(std::int8_t{-2}))).regions), "region -2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("unsigned_short", both(std::uint16_t{65534}))).regions), "region 65534: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("short", both(std::int16_t{-2}))).regions), "region -2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("unsigned_int", both(std::uint32_t{4294967294}))).regions),
+            "region 4294967294: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("vtktypeint64", both(std::int64_t{-2}))).regions), "region -2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("float", both(2.0f))).regions), "region 2: 0; region 3: 1");
+  EXPECT_EQ(to_text(read(with("double", both(2.5))).regions), "");
+  EXPECT_EQ(complaint(with("double", big_endian(2.5))).substr(0, 7), "a.vtk:1");
+}
+
+TEST_F(ReadVtk, NamesDataThatDoesNotFit) {
+  EXPECT_EQ(complaint(vtk_ascii + "CELL_DATA 2\n"), "a.vtk:19: there is data for 2 cells, there are 3");
+  EXPECT_EQ(complaint(vtk_ascii + "POINT_DATA 6\n"), "a.vtk:19: there is data for 6 points, there are 5");
+  const std::string head = vtk_ascii + "CELL_DATA 3\nSCALARS id int\n";
+  EXPECT_EQ(complaint(head + "1"), "a.vtk:20: the file ends within the array 'id'");
+  EXPECT_EQ(complaint(head + "1 2   "), "a.vtk:21: the file ends where a value should stand");
+  EXPECT_EQ(complaint(head + "1 x 3"), "a.vtk:21: a value is 'x', not a number");
+  EXPECT_EQ(complaint(vtk_ascii + "CELL_DATA 3\nSCALARS id what\n1 2 3\n"),
+            "a.vtk:20: the array 'id' is of the type 'what', which is not read");
+}
+
 // What Bullet ships and its own reader takes.
 TEST_F(ReadVtk, TakesHeadersAsOthersWriteThem) {
   expect_two_tetrahedra(read(replaced(vtk_ascii, "# vtk DataFile", "#vtk DataFile")));

@@ -74,6 +74,31 @@ TEST(Repair, DropsUnmentionedVerticesAndKeepsTheOrderOfTheRest) {
   EXPECT_EQ(mesh.tetrahedra, expected.tetrahedra);
 }
 
+TEST(Repair, NumbersGroupsAnew) {
+  TetMesh mesh = two_tetrahedra();
+  mesh.vertices.conservativeResize(Eigen::NoChange, 8);
+  mesh.vertices.rightCols<3>() << 9, 0, 1,  //
+      9, 0, 1,                              //
+      9, 1, 1;
+  // Vertex 6 stands where 3 does, 5 and 7 are in no tetrahedron; the first tetrahedron is there twice.
+  mesh.tetrahedra = {{0, 1, 2, 6}, {0, 1, 2, 3}, {0, 2, 1, 4}};
+  mesh.regions = {{"twice", {1}}, {"lower", {2, 2}}, {"none", {}}};
+  mesh.vertex_sets = {{"merged", {6, 3, 0}}, {"lost", {5, 7}}, {"part", {7, 4}}};
+  repair(mesh, MeshOrigin{});
+  EXPECT_EQ(to_text(mesh.regions), "twice: 0; lower: 1");
+  EXPECT_EQ(to_text(mesh.vertex_sets), "merged: 0 3; part: 4");
+}
+
+TEST(Repair, NamesMembersOfGroupsOutOfRange) {
+  TetMesh mesh = two_tetrahedra();
+  mesh.source = "b";
+  mesh.regions = {{"soft", {0, 2}}};
+  EXPECT_EQ(invalid_argument([&] { repair(mesh); }), "b: region 'soft': tetrahedron 2 is outside the 2 of the mesh");
+  mesh.regions.clear();
+  mesh.vertex_sets = {{"held", {-1}}};
+  EXPECT_EQ(invalid_argument([&] { repair(mesh); }), "b: vertex set 'held': vertex -1 is outside the 5 of the mesh");
+}
+
 TEST(Repair, NamesWhatItRefuses) {
   const auto complaint = [](auto spoil) {
     TetMesh mesh = two_tetrahedra();

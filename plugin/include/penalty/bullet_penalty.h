@@ -11,6 +11,7 @@
 #include "penalty/mesh/builders.h"
 #include "penalty/mesh/embed.h"
 #include "penalty/mesh/read_mesh.h"
+#include "penalty/mesh/regions.h"
 #include "penalty/mesh/surface_builders.h"
 #include "penalty/mesh/write_mesh.h"
 #include "penalty/stepping/relax.h"

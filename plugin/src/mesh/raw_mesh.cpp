@@ -64,6 +64,12 @@ class TagIndex {
 
 }  // namespace
 
+std::size_t RawGroups::group(const std::string& name) {
+  const auto [found, is_new] = by_name_.emplace(name, groups_.size());
+  if (is_new) groups_.push_back({name, {}});
+  return found->second;
+}
+
 void RawMesh::add_vertex(TextCursor& text) {
   for (std::string_view name : {"coordinate x", "coordinate y", "coordinate z"}) {
     coordinates.push_back(text.real(name));
@@ -90,20 +96,23 @@ TetMesh RawMesh::finish(std::string source) && {
   const TagIndex index(origin);
   const bool tagged = !origin.vertex_tags.empty();
   const auto vertices = static_cast<std::int64_t>(mesh.vertices.cols());
+  const auto find_vertex = [&](std::int64_t vertex) -> std::optional<int> {
+    if (tagged) return index.find(vertex);
+    if (vertex < 0 || vertex >= vertices) return std::nullopt;
+    return static_cast<int>(vertex);
+  };
   const auto index_of = [&](std::int64_t corner, std::size_t solid) {
-    std::optional<int> found;
-    if (tagged)
-      found = index.find(corner);
-    else if (corner >= 0 && corner < vertices)
-      found = static_cast<int>(corner);
+    const std::optional<int> found = find_vertex(corner);
     if (!found)
       fail_about_corner(origin, solid, corner, tagged ? "" : " is outside 0 to " + std::to_string(vertices - 1));
     return *found;
   };
   std::vector<std::int64_t> tags;  // of the tetrahedra, which are those of their solids
   std::vector<int> lines;
+  std::vector<int> begins;  // the first tetrahedron of each solid
   auto next = corners_.begin();
   for (std::size_t i = 0; i < solids_.size(); ++i) {
+    begins.push_back(static_cast<int>(mesh.tetrahedra.size()));
     std::array<int, 8> corners{};
     const auto size = static_cast<std::size_t>(solids_[i]);
     for (std::size_t k = 0; k < size; ++k) corners[k] = index_of(*next++, i);
@@ -115,6 +124,17 @@ TetMesh RawMesh::finish(std::string source) && {
     }
     tags.resize(mesh.tetrahedra.size(), origin.tetrahedron_tags[i]);
     if (!origin.tetrahedron_lines.empty()) lines.resize(mesh.tetrahedra.size(), origin.tetrahedron_lines[i]);
+  }
+  begins.push_back(static_cast<int>(mesh.tetrahedra.size()));
+  for (const auto& [name, members] : regions.groups()) {
+    mesh.regions.push_back({name, {}});
+    for (const std::int64_t solid : members)
+      for (int t = begins[solid]; t < begins[solid + 1]; ++t) mesh.regions.back().members.push_back(t);
+  }
+  for (const auto& [name, members] : vertex_sets.groups()) {
+    mesh.vertex_sets.push_back({name, {}});
+    for (const std::int64_t vertex : members)
+      if (const std::optional<int> found = find_vertex(vertex)) mesh.vertex_sets.back().members.push_back(*found);
   }
   origin.tetrahedron_tags = std::move(tags);
   origin.tetrahedron_lines = std::move(lines);

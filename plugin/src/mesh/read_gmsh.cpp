@@ -2,8 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
 
+#include "gmsh_elements.h"
+#include "gmsh_groups.h"
 #include "raw_mesh.h"
 
 namespace penalty {
@@ -11,62 +12,8 @@ namespace {
 
 enum class Layout { unknown, one, two, four_zero, four_one };
 
-// What the Gmsh manual, section "MSH file format", says of an element type. All list their corners first.
-struct ElementType {
-  int nodes = 0;               // 0: nothing that is read
-  std::optional<Solid> solid;  // none: a point, a line or a face
-};
-
-ElementType element_type(std::int64_t type) {
-  constexpr int lower[] = {0, 2, 3, 4, 0, 0, 0, 0, 3, 6, 9, 0, 0, 0, 0, 1, 8, 0, 0, 0, 9, 10, 12, 15, 15, 21, 4, 5, 6};
-  if (type > 0 && type < 29 && lower[type] > 0) return ElementType{lower[type], std::nullopt};
-  switch (type) {
-    case 36:
-      return ElementType{16, std::nullopt};
-    case 37:
-      return ElementType{25, std::nullopt};
-    case 38:
-      return ElementType{36, std::nullopt};
-    case 4:
-      return ElementType{4, Solid::tetrahedron};
-    case 11:
-      return ElementType{10, Solid::tetrahedron};
-    case 29:
-      return ElementType{20, Solid::tetrahedron};
-    case 30:
-      return ElementType{35, Solid::tetrahedron};
-    case 31:
-      return ElementType{56, Solid::tetrahedron};
-    case 5:
-      return ElementType{8, Solid::hexahedron};
-    case 12:
-      return ElementType{27, Solid::hexahedron};
-    case 17:
-      return ElementType{20, Solid::hexahedron};
-    case 32:
-      return ElementType{22, Solid::tetrahedron};
-    case 33:
-      return ElementType{28, Solid::tetrahedron};
-    case 92:
-      return ElementType{64, Solid::hexahedron};
-    case 93:
-      return ElementType{125, Solid::hexahedron};
-    case 6:
-      return ElementType{6, Solid::prism};
-    case 13:
-      return ElementType{18, Solid::prism};
-    case 18:
-      return ElementType{15, Solid::prism};
-    case 7:
-      return ElementType{5, Solid::pyramid};
-    case 14:
-      return ElementType{14, Solid::pyramid};
-    case 19:
-      return ElementType{13, Solid::pyramid};
-    default:
-      return {};
-  }
-}
+// More groups an entity than this make a small file a large mesh.
+constexpr std::int64_t most_physicals = 100;
 
 class GmshReader {
  public:
@@ -83,6 +30,11 @@ class GmshReader {
         text_.fail("found " + in_quotes(section) + " where a section should begin");
       if (section == "$MeshFormat") {
         read_format();
+      } else if (section == "$PhysicalNames") {
+        read_names();
+      } else if (section == "$Entities") {
+        require_format(section);
+        read_entities();
       } else if (!nodes && (section == "$Nodes" || section == "$NOD")) {
         require_format(section);
         read_nodes();
@@ -97,6 +49,7 @@ class GmshReader {
       }
       text_.expect(end_of(section));
     }
+    groups_.finish();
     const std::string source = text_.file();
     return std::move(mesh_).finish(source);
   }
@@ -165,6 +118,43 @@ class GmshReader {
   // How many items there are, each of that many bytes in a text or in a binary file.
   std::int64_t count(std::string_view what, std::size_t in_text, std::size_t in_binary) {
     return text_.checked_count(size(what), what, is_binary_ ? in_binary : in_text);
+  }
+
+  // dimension, number, name in quotes; as text in binary files, too
+  void read_names() {
+    const std::int64_t names = text_.count("the number of names", 6);
+    for (std::int64_t i = 0; i < names; ++i) {
+      text_.within("physical name", i);
+      const std::int64_t dimension = text_.integer("the dimension"), number = text_.integer("the number of the group");
+      std::string_view name = text_.rest_of_line();
+      if (name.size() >= 2 && name.front() == '"' && name.back() == '"') name = name.substr(1, name.size() - 2);
+      groups_.set_name(dimension, number, name);
+    }
+    text_.within({});
+  }
+
+  // Points, curves, surfaces and volumes of the model: number, box, physical groups, boundary.
+  void read_entities() {
+    begin_section();
+    std::array<std::int64_t, 4> numbers;
+    for (std::int64_t& number : numbers) number = count("the number of entities", 8, 20);
+    for (int dimension = 0; dimension < 4; ++dimension)
+      for (std::int64_t i = 0; i < numbers[dimension]; ++i) {
+        text_.within("entity", i);
+        const std::int64_t entity = integer("the number of the entity");
+        const bool is_place = dimension == 0 && layout_ == Layout::four_one;
+        for (int k = 0; k < (is_place ? 3 : 6); ++k) real("the box of the entity");
+        const std::int64_t physicals = count("the number of physical groups", 2, 4);
+        if (physicals > most_physicals)
+          text_.fail("it is in " + std::to_string(physicals) + " physical groups, more than " +
+                     std::to_string(most_physicals));
+        for (std::int64_t k = 0; k < physicals; ++k)
+          groups_.put_entity_in(dimension, entity, integer("a physical group"));
+        if (dimension == 0) continue;
+        const std::int64_t sides = count("the number of entities around it", 2, 4);
+        for (std::int64_t k = 0; k < sides; ++k) integer("an entity around it");
+      }
+    text_.within({});
   }
 
   void begin_section() {
@@ -244,14 +234,23 @@ class GmshReader {
       text_.within("element", i);
       const std::int64_t tag = text_.integer("the number of the element");
       text_.within("element", tag);
-      const ElementType type = read_type();
+      const GmshElement type = read_type();
       if (type.nodes == 0) refuse_type();
-      if (type.solid) {
-        const std::int64_t tags = layout_ == Layout::one ? 3 : text_.integer("the number of tags");
-        for (std::int64_t k = 0; k < tags; ++k) text_.integer("a tag");
+      // The physical group and the entity come first; in version 1 the number of nodes is the last of three.
+      const std::int64_t tags = layout_ == Layout::one ? 3 : text_.integer("the number of tags");
+      std::array<std::int64_t, 2> groups{};
+      for (std::int64_t k = 0; k < tags; ++k) {
+        const std::int64_t value = text_.integer("a tag");
+        if (k < 2) groups[k] = value;
       }
       add_element(type, tag, 4);
+      put_in(type, groups);
     }
+  }
+
+  void put_in(const GmshElement& type, const std::array<std::int64_t, 2>& groups) {
+    groups_.put_in(type.dimension, groups[0], nodes_);
+    if (type.solid) groups_.put_in_entity(3, groups[1], nodes_);
   }
 
   // Runs of elements of one type, each run after its type, size and number of tags.
@@ -260,7 +259,7 @@ class GmshReader {
     begin_section();
     for (std::int64_t read = 0; read < elements;) {
       text_.within("element", read);
-      const ElementType type = read_type();
+      const GmshElement type = read_type();
       const std::int64_t run = integer("the number of elements of this type"), tags = integer("the number of tags");
       if (run <= 0 || run > elements - read)
         text_.fail("a run of " + std::to_string(run) + " elements, where " + std::to_string(elements - read) +
@@ -270,8 +269,13 @@ class GmshReader {
       for (std::int64_t i = 0; i < run; ++i, ++read) {
         const std::int64_t tag = integer("the number of the element");
         text_.within("element", tag);
-        text_.bytes(4 * static_cast<std::size_t>(tags), "the tags");
+        std::array<std::int64_t, 2> groups{};
+        for (std::int64_t k = 0; k < tags; ++k) {
+          const std::int64_t value = integer("a tag");
+          if (k < 2) groups[k] = value;
+        }
         add_element(type, tag, 4);
+        put_in(type, groups);
       }
     }
   }
@@ -282,39 +286,41 @@ class GmshReader {
     for (int k = 0; k < (is_four_one ? 3 : 1); ++k) size("a total");
     for (std::int64_t block = 0; block < blocks; ++block) {
       text_.within("element block", block);
-      integer("the entity");
-      integer("the entity");
-      const ElementType type = read_type();
+      const std::int64_t first = integer("the entity"), second = integer("the entity");  // dimension and tag
+      const std::int64_t entity = is_four_one ? second : first;
+      const GmshElement type = read_type();
       const std::int64_t elements = count("the number of elements", 4, 8);
       if (type.nodes == 0 && elements > 0) refuse_type();
       for (std::int64_t i = 0; i < elements; ++i) {
         const std::int64_t tag = is_four_one ? size("the number of the element") : integer("the number of the element");
         text_.within("element", tag);
         add_element(type, tag, is_four_one ? 8 : 4);
+        groups_.put_in_entity(type.dimension, entity, nodes_);
       }
     }
   }
 
-  ElementType read_type() { return element_type(type_ = integer("the element type")); }
+  GmshElement read_type() { return gmsh_element(type_ = integer("the element type")); }
 
   [[noreturn]] void refuse_type() const {
     text_.fail("element type " + std::to_string(type_) + " is not read: save the mesh with elements of first order");
   }
 
-  // Reads the nodes of an element; in a binary file each has so many bytes.
-  void add_element(const ElementType& type, std::int64_t tag, std::size_t bytes) {
-    std::size_t corners = 0;
+  // Reads the nodes of an element, those of a solid as far as its corners; in a binary file each has so many bytes.
+  void add_element(const GmshElement& type, std::int64_t tag, std::size_t bytes) {
+    const auto size = static_cast<std::size_t>(type.nodes),
+               corners = type.solid ? static_cast<std::size_t>(*type.solid) : size;
+    nodes_.clear();
+    for (std::size_t k = 0; k < corners; ++k)
+      nodes_.push_back(bytes == 8 ? this->size("a corner") : integer("a corner"));
     if (type.solid) {
-      std::array<std::int64_t, 8> nodes;
-      corners = static_cast<std::size_t>(*type.solid);
-      for (std::size_t k = 0; k < corners; ++k) nodes[k] = bytes == 8 ? size("a corner") : integer("a corner");
-      mesh_.add(*type.solid, std::span(nodes).first(corners), tag, is_binary_ ? 0 : text_.line());
-      if (static_cast<std::size_t>(type.nodes) > corners) mesh_.count_reduced();
+      mesh_.add(*type.solid, nodes_, tag, is_binary_ ? 0 : text_.line());
+      if (size > corners) mesh_.count_reduced();
     } else {
       mesh_.count_skipped();
     }
     if (is_binary_)
-      text_.bytes(bytes * (static_cast<std::size_t>(type.nodes) - corners), "the nodes of an element");
+      text_.bytes(bytes * (size - corners), "the nodes of an element");
     else
       text_.rest_of_line();
   }
@@ -322,7 +328,9 @@ class GmshReader {
   TextCursor text_;
   RawMesh mesh_;
   Layout layout_ = Layout::unknown;
-  std::int64_t type_ = 0;  // of the element read last
+  GmshGroups groups_{mesh_};
+  std::int64_t type_ = 0;            // of the element read last
+  std::vector<std::int64_t> nodes_;  // its corners
   bool is_binary_ = false, is_swapped_ = false;
 };
 

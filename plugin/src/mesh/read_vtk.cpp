@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
+#include <charconv>
+#include <type_traits>
 
 #include "raw_mesh.h"
+#include "vtk_cells.h"
 
 namespace penalty {
 namespace {
@@ -18,61 +20,6 @@ std::size_t size_of(std::string_view type) {
   if (name == "long" || name == "unsigned_long" || name == "double" || name == "vtktypeint64" || name == "vtkidtype")
     return 8;
   return 0;
-}
-
-// What VTK says of a type of cells. All list their corners first, and go round as ours do, but voxels.
-struct CellType {
-  int nodes;                   // 0: any number, of any order; -1: unknown
-  std::optional<Solid> solid;  // none: points, lines, faces
-  const char* name;
-};
-
-CellType cell_type(std::int64_t type) {
-  const bool is_lower = (type >= 0 && type <= 9) || (type >= 21 && type <= 23) || type == 28 || type == 30 ||
-                        (type >= 34 && type <= 36) || (type >= 68 && type <= 70) || (type >= 75 && type <= 77);
-  if (is_lower) return {0, std::nullopt, ""};
-  switch (type) {
-    case 10:
-      return {4, Solid::tetrahedron, "tetrahedron"};
-    case 11:
-      return {8, Solid::hexahedron, "voxel"};
-    case 12:
-      return {8, Solid::hexahedron, "hexahedron"};
-    case 13:
-      return {6, Solid::prism, "wedge"};
-    case 14:
-      return {5, Solid::pyramid, "pyramid"};
-    case 24:
-      return {10, Solid::tetrahedron, "tetrahedron"};
-    case 25:
-      return {20, Solid::hexahedron, "hexahedron"};
-    case 26:
-      return {15, Solid::prism, "wedge"};
-    case 27:
-      return {13, Solid::pyramid, "pyramid"};
-    case 29:
-      return {27, Solid::hexahedron, "hexahedron"};
-    case 31:
-      return {12, Solid::prism, "wedge"};
-    case 32:
-      return {18, Solid::prism, "wedge"};
-    case 33:
-      return {24, Solid::hexahedron, "hexahedron"};
-    case 71:
-    case 78:
-      return {0, Solid::tetrahedron, "tetrahedron"};
-    case 72:
-    case 79:
-      return {0, Solid::hexahedron, "hexahedron"};
-    case 73:
-    case 80:
-      return {0, Solid::prism, "wedge"};
-    case 74:
-    case 81:
-      return {0, Solid::pyramid, "pyramid"};
-    default:
-      return {-1, std::nullopt, ""};
-  }
 }
 
 template <class T>
@@ -92,7 +39,7 @@ class VtkReader {
   TetMesh read() {
     read_header();
     bool points = false, cells = false, types = false;
-    while (!(points && cells && types)) {  // what follows is data on points and cells
+    while (!(points && cells && types)) {
       text_.within({});
       if (text_.at_end()) text_.fail(missing(points, cells));
       const std::string keyword = lower_case(text_.word("a section"));
@@ -103,12 +50,13 @@ class VtkReader {
       else if (keyword == "cell_types" && cells && !types)
         read_types(), types = true;
       else if (keyword == "field")
-        skip_field();
+        read_field(-1, [](const VtkArray&) {});
       else if (keyword == "metadata")
         skip_metadata();
       else
         text_.fail("found " + in_quotes(keyword) + " where a section should begin; " + missing(points, cells));
     }
+    read_data();
     const std::string source = text_.file();
     return std::move(mesh_).finish(source);
   }
@@ -193,14 +141,14 @@ class VtkReader {
     if (offset_size != 4 && offset_size != 8) text_.fail("the offsets must be of a four or eight byte integer type");
     if (binary_ && static_cast<std::size_t>(offset_count) > text_.remaining() / offset_size)
       text_.fail("the file ends within the offsets of the cells");
-    cell_begins_ = integers(offset_count, offset_size, "an offset");
+    cells_.begins = integers(offset_count, offset_size, "an offset");
     text_.expect("CONNECTIVITY");
     const std::size_t corner_size = size_of(text_.word("the type of the corners"));
     if (corner_size != 4 && corner_size != 8) text_.fail("the corners must be of a four or eight byte integer type");
     read_corners(corner_count, corner_size);
-    for (std::size_t i = 0; i < cell_begins_.size(); ++i)
-      if (cell_begins_[i] < (i == 0 ? 0 : cell_begins_[i - 1]) || cell_begins_[i] > corner_count)
-        text_.fail("cell " + std::to_string(i) + ": offset " + std::to_string(cell_begins_[i]) +
+    for (std::size_t i = 0; i < cells_.begins.size(); ++i)
+      if (cells_.begins[i] < (i == 0 ? 0 : cells_.begins[i - 1]) || cells_.begins[i] > corner_count)
+        text_.fail("cell " + std::to_string(i) + ": offset " + std::to_string(cells_.begins[i]) +
                    " is out of order or beyond the " + std::to_string(corner_count) + " corners");
   }
 
@@ -208,12 +156,12 @@ class VtkReader {
     if (binary_ && static_cast<std::size_t>(count) > text_.remaining() / size)
       text_.fail("the file ends within the corners of the cells");
     if (binary_) {
-      corners_ = integers(count, size, "the corners");
+      cells_.corners = integers(count, size, "the corners");
       return;
     }
     for (std::int64_t i = 0; i < count; ++i) {
-      corners_.push_back(text_.integer("a corner"));
-      corner_lines_.push_back(text_.line());
+      cells_.corners.push_back(text_.integer("a corner"));
+      cells_.lines.push_back(text_.line());
     }
   }
 
@@ -226,7 +174,7 @@ class VtkReader {
     const auto next = [&](const char* what) {
       return binary_ ? list[static_cast<std::size_t>(used++)] : text_.integer(what);
     };
-    cell_begins_.push_back(0);
+    cells_.begins.push_back(0);
     for (std::int64_t i = 0; i < cells; ++i) {
       text_.within("cell", i);
       if (binary_ && used >= size) text_.fail("the list of " + std::to_string(size) + " numbers ends before it");
@@ -236,10 +184,10 @@ class VtkReader {
         text_.fail("the number of corners is " + std::to_string(corners) + ", the list has room for " +
                    std::to_string(room));
       for (std::int64_t k = 0; k < corners; ++k) {
-        corners_.push_back(next("a corner"));
-        if (!binary_) corner_lines_.push_back(text_.line());
+        cells_.corners.push_back(next("a corner"));
+        if (!binary_) cells_.lines.push_back(text_.line());
       }
-      cell_begins_.push_back(static_cast<std::int64_t>(corners_.size()));
+      cells_.begins.push_back(static_cast<std::int64_t>(cells_.corners.size()));
     }
     text_.within({});
     if (binary_ && used != size)
@@ -248,9 +196,9 @@ class VtkReader {
 
   void read_types() {
     const std::int64_t announced = text_.integer("the number of cell types");
-    const std::size_t cells = cell_begins_.empty() ? 0 : cell_begins_.size() - 1;
+    const std::size_t cells = cells_.size();
     if (!binary_ && text_.peek().empty() && all_have_four_corners()) {  // Bullet's own samples end here
-      for (std::size_t i = 0; i < cells; ++i) add_cell(i, 10);
+      for (std::size_t i = 0; i < cells; ++i) add_cell(10);
       return;
     }
     const std::int64_t count = text_.checked_count(announced, "the number of cell types", binary_ ? 4 : 1);
@@ -260,57 +208,125 @@ class VtkReader {
     if (binary_) binary_types = integers(count, 4, "the cell types");
     for (std::size_t i = 0; i < cells; ++i) {
       text_.within("cell", static_cast<std::int64_t>(i));
-      add_cell(i, binary_ ? binary_types[i] : text_.integer("the type"));
+      add_cell(binary_ ? binary_types[i] : text_.integer("the type"));
     }
+  }
+
+  void add_cell(std::int64_t type) {
+    const std::string complaint = cells_.add(type, mesh_);
+    if (!complaint.empty()) text_.fail(complaint);
   }
 
   bool all_have_four_corners() const {
-    for (std::size_t i = 0; i + 1 < cell_begins_.size(); ++i)
-      if (cell_begins_[i + 1] - cell_begins_[i] != 4) return false;
+    for (std::size_t i = 0; i + 1 < cells_.begins.size(); ++i)
+      if (cells_.begins[i + 1] - cells_.begins[i] != 4) return false;
     return true;
   }
 
-  void add_cell(std::size_t cell, std::int64_t type) {
-    const CellType known = cell_type(type);
-    if (known.nodes < 0)
-      text_.fail("type " + std::to_string(type) + " is not read: save the mesh with cells of first or second order");
-    if (!known.solid) {
-      mesh_.count_skipped();
-      return;
+  void read_data() {
+    enum class On { nothing, points, cells } on = On::nothing;
+    std::int64_t count = 0;
+    const auto keep = [&](const VtkArray& array) {
+      if (on != On::nothing) cells_.put_in_groups(array, on == On::cells, mesh_);
+    };
+    while (!text_.at_end()) {
+      text_.within({});
+      const std::string keyword = lower_case(text_.word("a section"));
+      if (keyword == "cell_data" || keyword == "point_data") {
+        on = keyword == "cell_data" ? On::cells : On::points;
+        count = text_.integer("the number of values");
+        const auto expected = static_cast<std::int64_t>(on == On::cells ? cells_.size() : mesh_.coordinates.size() / 3);
+        if (count != expected)
+          text_.fail("there is data for " + std::to_string(count) + (on == On::cells ? " cells" : " points") +
+                     ", there are " + std::to_string(expected));
+      } else if (keyword == "scalars") {
+        const std::string name(text_.word("a name")), type(text_.word("a type"));
+        const std::int64_t components = text_.at_line_end() ? 1 : text_.count("the number of components", 1);
+        if (lower_case(text_.peek()) == "lookup_table") text_.word("LOOKUP_TABLE"), text_.word("the name of a table");
+        keep(read_array(name, components, count, type));
+      } else if (keyword == "field") {
+        read_field(on == On::nothing ? -1 : count, keep);
+      } else if (keyword == "vectors" || keyword == "normals" || keyword == "tensors" || keyword == "global_ids" ||
+                 keyword == "pedigree_ids") {
+        const std::string name(text_.word("a name")), type(text_.word("a type"));
+        read_array(name, keyword == "tensors" ? 9 : keyword.ends_with("ids") ? 1 : 3, count, type);
+      } else if (keyword == "metadata") {
+        skip_metadata();
+      } else {
+        return;  // nothing that says how long it is
+      }
     }
-    const auto begin = static_cast<std::size_t>(cell_begins_[cell]);
-    const std::size_t nodes = static_cast<std::size_t>(cell_begins_[cell + 1]) - begin;
-    const auto size = static_cast<std::size_t>(*known.solid);
-    const bool fits = known.nodes > 0 ? nodes == static_cast<std::size_t>(known.nodes) : nodes >= size;
-    if (!fits)
-      text_.fail(std::string("a ") + known.name + " with " + std::to_string(nodes) + " corners, not " +
-                 std::to_string(known.nodes > 0 ? known.nodes : static_cast<int>(size)));
-    std::array<std::int64_t, 8> corners;
-    std::copy_n(corners_.begin() + static_cast<std::ptrdiff_t>(begin), size, corners.begin());
-    if (type == 11) {  // a voxel goes by rows
-      std::swap(corners[2], corners[3]);
-      std::swap(corners[6], corners[7]);
-    }
-    mesh_.add(*known.solid, corners, static_cast<std::int64_t>(cell), corner_lines_.empty() ? 0 : corner_lines_[begin]);
-    if (nodes > size) mesh_.count_reduced();
   }
 
-  void skip_field() {
+  template <class Keep>
+  void read_field(std::int64_t count, const Keep& keep) {
     text_.word("the name of the field");
     const std::int64_t arrays = text_.count("the number of arrays", 4);
     for (std::int64_t i = 0; i < arrays; ++i) {
-      text_.word("the name of an array");
+      if (lower_case(text_.peek()) == "metadata") text_.word("METADATA"), skip_metadata();
+      const std::string name(text_.word("the name of an array"));
       const std::int64_t components = text_.count("the number of components", 1);
       const std::int64_t tuples = text_.count("the number of tuples", 1);
-      const std::size_t size = size_of(text_.word("the type of an array"));
-      if (size == 0) text_.fail("an array of unknown type");
-      if (components > 0 && tuples > static_cast<std::int64_t>(text_.remaining()) / components)
-        text_.fail("the file ends within an array of the field");
-      if (binary_)
-        raw(components * tuples, size, "an array of the field");
-      else
-        for (std::int64_t k = 0; k < components * tuples; ++k) text_.word("a number");
+      const std::string type(text_.word("the type of an array"));
+      const VtkArray array = read_array(name, components, tuples, type);
+      if (tuples == count) keep(array);
     }
+  }
+
+  // Values of arrays of one component; others are passed over.
+  VtkArray read_array(const std::string& name, std::int64_t components, std::int64_t tuples, const std::string& type) {
+    const std::string kind = lower_case(type);
+    const std::size_t size = kind == "vtkidtype" ? 4 : size_of(kind);  // ids are written as int
+    if (size == 0 && (binary_ || (kind != "bit" && kind != "string")))
+      text_.fail("the array " + in_quotes(name) + " is of the type " + in_quotes(type) + ", which is not read");
+    if (components > 0 && tuples > static_cast<std::int64_t>(text_.remaining()) / components)
+      text_.fail("the file ends within the array " + in_quotes(name));
+    VtkArray array{.name = decoded(name), .is_integer = kind != "float" && kind != "double", .values = {}};
+    const std::int64_t count = components * tuples;
+    const bool is_kept = components == 1 && kind != "string";
+    if (!binary_) {
+      for (std::int64_t k = 0; k < count; ++k)
+        if (is_kept)
+          array.values.push_back(text_.real("a value"));
+        else
+          text_.word("a value");
+      return array;
+    }
+    const std::string_view bytes = raw(count, size, "an array");
+    for (std::int64_t k = 0; is_kept && k < count; ++k)
+      array.values.push_back(number(bytes.data() + static_cast<std::size_t>(k) * size, kind, size));
+    return array;
+  }
+
+  static double number(const char* bytes, const std::string& kind, std::size_t size) {
+    if (kind == "float") return big_endian<float>(bytes);
+    if (kind == "double") return big_endian<double>(bytes);
+    const auto value = [&](auto of_unsigned) -> double {
+      using Unsigned = decltype(of_unsigned);
+      const auto bits = big_endian<Unsigned>(bytes);
+      if (kind.starts_with("unsigned")) return static_cast<double>(bits);
+      return static_cast<double>(static_cast<std::make_signed_t<Unsigned>>(bits));
+    };
+    if (size == 1) return value(std::uint8_t{});
+    if (size == 2) return value(std::uint16_t{});
+    if (size == 4) return value(std::uint32_t{});
+    return value(std::uint64_t{});
+  }
+
+  // Names have %20 for a space.
+  static std::string decoded(std::string_view name) {
+    std::string text;
+    for (std::size_t i = 0; i < name.size(); ++i) {
+      unsigned code = 0;
+      if (name[i] == '%' && i + 2 < name.size() &&
+          std::from_chars(name.data() + i + 1, name.data() + i + 3, code, 16).ptr == name.data() + i + 3) {
+        text += static_cast<char>(code);
+        i += 2;
+      } else {
+        text += name[i];
+      }
+    }
+    return text;
   }
 
   // Names of components and the like, up to an empty line.
@@ -322,9 +338,7 @@ class VtkReader {
   TextCursor text_;
   RawMesh mesh_;
   bool binary_ = false;
-  std::vector<std::int64_t> cell_begins_;  // cell i: corners_[cell_begins_[i]] to before [cell_begins_[i + 1]]
-  std::vector<std::int64_t> corners_;
-  std::vector<int> corner_lines_;  // empty for binary files
+  VtkCells cells_;
 };
 
 }  // namespace

@@ -96,6 +96,26 @@ void for_each_twin(const TetMesh& mesh, const Call& twins) {
       first = k;
 }
 
+void check_groups(const std::vector<MeshGroup>& groups, std::size_t size, const char* kind, const char* member,
+                  const Complaint& complaint) {
+  for (const MeshGroup& group : groups)
+    for (const int i : group.members)
+      if (i < 0 || static_cast<std::size_t>(i) >= size)
+        complaint.about_mesh(std::string(kind) + " " + in_quotes(group.name) + ": " + member + " " + std::to_string(i) +
+                             " is outside the " + std::to_string(size) + " of the mesh");
+}
+
+// Members are numbered anew, -1 being nowhere, put in order, each once; what has none left goes.
+void renumber(std::vector<MeshGroup>& groups, const std::vector<int>& new_index) {
+  for (auto& [name, members] : groups) {
+    for (int& member : members) member = new_index[member];
+    std::erase(members, -1);
+    std::sort(members.begin(), members.end());
+    members.erase(std::unique(members.begin(), members.end()), members.end());
+  }
+  std::erase_if(groups, [](const MeshGroup& group) { return group.members.empty(); });
+}
+
 void check_duplicates(const TetMesh& mesh, const Complaint& complaint) {
   for_each_twin(mesh, [&](std::size_t first, std::size_t other) {
     complaint.about_tetrahedron(other, "same four vertices as " + complaint.tetrahedron_name(first));
@@ -155,31 +175,36 @@ void merge_vertices(TetMesh& mesh) {
   if (merged == 0) return;
   for (Tetrahedron& t : mesh.tetrahedra)
     for (int& v : t) v = kept[v];
+  renumber(mesh.vertex_sets, kept);
   mesh.repairs.merged_vertices += merged;
   mesh.repairs.dropped_vertices -= merged;  // as which they will be counted
 }
 
-// Of twins all but the first, and what is flat, if that is little.
+// Of twins all but the first, which takes their place in regions, and what is flat, if that is little.
 void drop_tetrahedra(TetMesh& mesh, MeshOrigin& origin) {
-  std::vector<bool> is_dropped(mesh.tetrahedra.size(), false);
-  for_each_twin(mesh, [&](std::size_t, std::size_t other) { is_dropped[other] = true; });
+  std::vector<int> kept(mesh.tetrahedra.size());  // which stands for it; -1: none
+  std::iota(kept.begin(), kept.end(), 0);
+  for_each_twin(mesh, [&](std::size_t first, std::size_t other) { kept[other] = static_cast<int>(first); });
+  const auto is_kept = [&](std::size_t i) { return kept[i] == static_cast<int>(i); };
   std::vector<std::size_t> flat;
-  for (std::size_t i = 0; i < mesh.tetrahedra.size(); ++i)
-    if (!is_dropped[i] && shape_of(mesh, mesh.tetrahedra[i]).is_flat()) flat.push_back(i);
-  if (100 * flat.size() <= mesh.tetrahedra.size())
-    for (const std::size_t i : flat) is_dropped[i] = true;
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    if (is_kept(i) && shape_of(mesh, mesh.tetrahedra[i]).is_flat()) flat.push_back(i);
+  if (100 * flat.size() <= kept.size())
+    for (const std::size_t i : flat) kept[i] = -1;
   const auto keep = [&](auto& list) {
-    if (list.size() != is_dropped.size()) return;
+    if (list.size() != kept.size()) return;
     std::size_t size = 0;
     for (std::size_t i = 0; i < list.size(); ++i)
-      if (!is_dropped[i]) list[size++] = list[i];
+      if (is_kept(i)) list[size++] = list[i];
     list.resize(size);
   };
-  const std::size_t before = mesh.tetrahedra.size();
   keep(origin.tetrahedron_tags);
   keep(origin.tetrahedron_lines);
   keep(mesh.tetrahedra);
-  mesh.repairs.dropped_tetrahedra += static_cast<int>(before - mesh.tetrahedra.size());
+  mesh.repairs.dropped_tetrahedra += static_cast<int>(kept.size() - mesh.tetrahedra.size());
+  for (int i = 0, index = 0; i < static_cast<int>(kept.size()); ++i)
+    kept[i] = kept[i] == i ? index++ : kept[i] < 0 ? -1 : kept[kept[i]];  // the first of twins comes first
+  renumber(mesh.regions, kept);
 }
 
 void drop_unused_vertices(TetMesh& mesh) {
@@ -192,6 +217,7 @@ void drop_unused_vertices(TetMesh& mesh) {
       mesh.vertices.col(kept) = mesh.vertices.col(static_cast<Eigen::Index>(v)).eval();
       new_index[v] = kept++;
     }
+  renumber(mesh.vertex_sets, new_index);
   const int dropped = static_cast<int>(mesh.vertices.cols()) - kept;
   if (dropped == 0) return;
   mesh.vertices.conservativeResize(Eigen::NoChange, kept);
@@ -204,6 +230,8 @@ void check(const TetMesh& mesh, const Complaint& complaint) {
   check_vertices(mesh, complaint);
   if (mesh.tetrahedra.empty()) complaint.about_mesh("the mesh has no tetrahedra");
   check_indices(mesh, complaint);
+  check_groups(mesh.regions, mesh.tetrahedra.size(), "region", "tetrahedron", complaint);
+  check_groups(mesh.vertex_sets, static_cast<std::size_t>(mesh.vertices.cols()), "vertex set", "vertex", complaint);
 }
 
 }  // namespace
@@ -214,6 +242,9 @@ void repair(TetMesh& mesh) {
   check_duplicates(mesh, complaint);
   orient(mesh, complaint);
   drop_unused_vertices(mesh);
+  std::vector<int> same(mesh.tetrahedra.size());
+  std::iota(same.begin(), same.end(), 0);
+  renumber(mesh.regions, same);
 }
 
 void repair(TetMesh& mesh, const MeshOrigin& origin) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "penalty/fields/topology.h"
@@ -30,11 +31,23 @@ struct MeshRepair {
 /// In words, e.g. "merged 4 vertices, dropped 1 tetrahedron"; empty where nothing was changed.
 std::string to_text(const MeshRepair& repairs);
 
+/// Tetrahedra or vertices that belong together under a name.
+struct MeshGroup {
+  std::string name;
+  std::vector<int> members;  // ascending, each once, once repaired
+};
+
 struct TetMesh {
   Eigen::Matrix3Xd vertices;            // 3 x V [m]
   std::vector<Tetrahedron> tetrahedra;  // positively oriented once repaired
   std::string source;                   // file name or builder call, for messages and summaries
   MeshRepair repairs;
+  std::vector<MeshGroup> regions;      // of tetrahedra: they may overlap, and leave some out
+  std::vector<MeshGroup> vertex_sets;  // of vertices
+
+  /// Members of the region or the vertex set of that name. Throw std::invalid_argument that says which there are.
+  const std::vector<int>& region(std::string_view name) const;
+  const std::vector<int>& vertex_set(std::string_view name) const;
 };
 
 /// Where the elements of a mesh stand in their files, for error messages. An empty list means "unknown"; without tags
@@ -54,9 +67,9 @@ inline constexpr Real largest_coordinate = 1e100;
 
 /// Makes `mesh` usable or throws. Left-handed tetrahedra get their last two vertices swapped; vertices that no
 /// tetrahedron mentions are dropped, the others keep their order; both are added to `mesh.repairs`. Afterwards node i
-/// of a body is column i of `vertices`.
+/// of a body is column i of `vertices`. Regions and vertex sets follow; those that have become empty go.
 /// Refused: no tetrahedra, coordinates not finite or beyond `largest_coordinate` (unmentioned vertices too), indices
-/// out of range or repeated within a tetrahedron, two tetrahedra with the same four vertices, flat tetrahedra.
+/// out of range or repeated within a tetrahedron, two tetrahedra with the same four vertices, flat tetrahedra, members of regions and vertex sets out of range.
 /// Throws std::invalid_argument that names `mesh.source`, the element and the value.
 void repair(TetMesh& mesh);
 
