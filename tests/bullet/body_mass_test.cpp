@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "bullet/simulation.h"
+#include "penalty/mesh/regions.h"
 #include "penalty/mesh/surface_builders.h"
 
 namespace penalty::testing {
@@ -70,6 +71,67 @@ TEST_P(MassByDensity, OfASurfaceTakesItsThickness) {
   }
   const auto balloon = make_soft_body(sim.info(), ball, wood, 0.002);
   EXPECT_NEAR(mass_of(*balloon) / (800 * area * 0.002), 1, limit(1e-12, 1e-5)) << "the air inside weighs nothing";
+}
+
+// A bar of 0.2 x 1 x 0.2 m, its upper half of one material, its lower half of another.
+struct TwoHalves {
+  TetMesh mesh = make_box({0.2, 1, 0.2}, {2, 10, 2});
+  Materials materials;
+
+  TwoHalves(const Material& upper, const Material& lower) {
+    mesh.regions = {{"upper", {}}, {"lower", {}}};
+    for (std::size_t t = 0; t < mesh.tetrahedra.size(); ++t)
+      mesh.regions[is_lower(t)].members.push_back(static_cast<int>(t));
+    mesh.vertex_sets = {{"top", {}}};
+    for (int v = 0; v < mesh.vertices.cols(); ++v)
+      if (mesh.vertices(1, v) > 1 - 1e-9) mesh.vertex_sets[0].members.push_back(v);
+    materials = materials_of(mesh, {{"lower", lower}, {"upper", upper}});
+  }
+  bool is_lower(std::size_t t) const { return mesh.vertices(Eigen::all, mesh.tetrahedra[t]).row(1).mean() < 0.5; }
+};
+
+TEST_P(MassByDensity, OfSeveralMaterialsLiesWhereTheyAre) {
+  const TwoHalves bar({.density = 3000}, {.density = 1000});
+  for (const bool equal : {true, false}) {
+    const auto body = make_soft_body(sim.info(), bar.mesh, bar.materials, {.equal_masses = equal});
+    Real mass = 0, moment = 0;
+    for (int i = 0; i < body->m_nodes.size(); ++i) {
+      mass += mass_of_node(*body, i);
+      moment += mass_of_node(*body, i) * bar.mesh.vertices(1, i);
+    }
+    EXPECT_NEAR(mass, 0.02 * 3000 + 0.02 * 1000, limit(1e-9, 1e-3));
+    // 0.75 of the mass at 0.75 m, the rest at 0.25 m; or in eleven layers of equal nodes, five of them three times as
+    // heavy as the lowest five, one twice.
+    EXPECT_NEAR(moment / mass, equal ? (3 * 4.0 + 2 * 0.5 + 1) / (3 * 5 + 2 + 5) : 0.625, limit(1e-9, 1e-5)) << equal;
+  }
+  EXPECT_EQ(refusal(bar.mesh, bar.materials, SoftBodyOptions{.mass = 2}),
+            "soft body: mass is 2 kg, but the density of the material decides: leave one of them out");
+  EXPECT_EQ(refusal(bar.mesh, Materials{{wood}, {0}}),
+            "materials: they are those of 1 tetrahedra, not of " + std::to_string(bar.mesh.tetrahedra.size()));
+}
+
+TEST_P(MassByDensity, OfSeveralMaterialsStretchesAHangingBarAsBeamTheorySays) {
+  const Real heavy = 2000, light = 500, stiff = 8e5, soft = 2e5, g = 9.81, half = 0.5;
+  const Material upper{.young = stiff, .poisson = 0, .density = light, .damping = 0.02};
+  const Material lower{.young = soft, .poisson = 0, .density = heavy, .damping = 0.02};
+  const TwoHalves bar(upper, lower);
+  btSoftBody& body = sim.add(make_soft_body(sim.info(), bar.mesh, bar.materials,
+                                            {.equal_masses = false, .pinned = bar.mesh.vertex_set("top")}));
+  sim.set_gravity({0, -g, 0});
+  sim.penalty().attach(
+      body, make_elastic_field(bar.mesh.vertices, bar.mesh.tetrahedra, bar.materials, ElasticModel::neo_hookean));
+  sim.step(1.0 / 60, 240);
+  // A section is pulled by all that hangs below it: strain = g (mass below) / (E area).
+  const Real at_half = g * (heavy * half * half + light * half * half / 2) / stiff;
+  const Real at_end = at_half + g * heavy * half * half / 2 / soft;
+  for (int i = 0; i < body.m_nodes.size(); ++i) {
+    const Real y = bar.mesh.vertices(1, i), sunk = y - Real(body.m_nodes[i].m_x.y());
+    if (std::abs(y - half) < 1e-9) {
+      EXPECT_NEAR(sunk / at_half, 1, 0.02);
+    } else if (y < 1e-9) {
+      EXPECT_NEAR(sunk / at_end, 1, 0.02);
+    }
+  }
 }
 
 TEST_P(MassByDensity, NeedsNumbersThatMakeAMass) {

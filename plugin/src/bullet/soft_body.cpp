@@ -3,6 +3,7 @@
 #include <BulletSoftBody/btSoftBody.h>
 
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -64,20 +65,27 @@ Real sum_of_sizes(const std::vector<Real>& sizes) {
   return sum;
 }
 
-/// Equal masses, or each element's share of the mass, by its size, divided among its nodes. `element` is the word for
-/// one in messages.
+/// Equal masses, or each element's share of the mass, by its size times its density relative to others, divided among
+/// its nodes. With such `densities`, equal masses are times the mean around each node. `element` is the word for one in
+/// messages.
 template <std::size_t N>
 std::vector<Real> node_masses(int num_vertices, const std::vector<std::array<int, N>>& elements,
-                              const std::vector<Real>& sizes, const char* element, const SoftBodyOptions& options) {
-  if (options.equal_masses)
+                              const std::vector<Real>& sizes, const char* element, const SoftBodyOptions& options,
+                              const std::vector<Real>& densities = {}) {
+  if (options.equal_masses && densities.empty())
     return std::vector<Real>(static_cast<std::size_t>(num_vertices),
                              mass_of(options) / static_cast<Real>(num_vertices));
-  std::vector<Real> masses(static_cast<std::size_t>(num_vertices), 0);
-  const Real total = sum_of_sizes(sizes);
+  std::vector<Real> masses(static_cast<std::size_t>(num_vertices), 0), shares = masses;
   for (std::size_t e = 0; e < sizes.size(); ++e)
-    for (const int node : elements[e]) masses[node] += std::abs(sizes[e]) / N;
+    for (const int node : elements[e]) {
+      shares[node] += std::abs(sizes[e]);
+      masses[node] += std::abs(sizes[e]) * (densities.empty() ? 1 : densities[e]);
+    }
+  if (options.equal_masses)
+    for (std::size_t i = 0; i < masses.size(); ++i) masses[i] /= shares[i];
+  const Real scale = mass_of(options) / std::accumulate(masses.begin(), masses.end(), Real{0});
   for (std::size_t i = 0; i < masses.size(); ++i) {
-    masses[i] *= mass_of(options) / total;
+    masses[i] *= scale;
     if (!(masses[i] > 0))
       throw std::invalid_argument("soft body: node " + std::to_string(i) + " has mass " + to_text(masses[i]) +
                                   " kg: no " + element + " of the mesh holds it");
@@ -108,15 +116,24 @@ std::unique_ptr<btSoftBody> assemble(btSoftBodyWorldInfo& world_info, const Eige
 
 }  // namespace
 
-std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
-                                           const SoftBodyOptions& options) {
+namespace {
+
+std::unique_ptr<btSoftBody> from_tetrahedra(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                            const SoftBodyOptions& options, const std::vector<Real>& densities = {}) {
   check(mesh.vertices, options);
   check_indices(mesh.vertices, mesh.tetrahedra, "tetrahedron");
   return assemble(world_info, mesh.vertices, boundary_faces(mesh.tetrahedra),
                   options.stock_deformable ? edges_of(mesh.tetrahedra) : std::vector<Edge>{},
                   node_masses(static_cast<int>(mesh.vertices.cols()), mesh.tetrahedra,
-                              signed_volumes(mesh.vertices, mesh.tetrahedra), "tetrahedron", options),
+                              signed_volumes(mesh.vertices, mesh.tetrahedra), "tetrahedron", options, densities),
                   options);
+}
+
+}  // namespace
+
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const SoftBodyOptions& options) {
+  return from_tetrahedra(world_info, mesh, options);
 }
 
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
@@ -124,6 +141,22 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
   check_indices(mesh.vertices, mesh.tetrahedra, "tetrahedron");
   const Real volume = sum_of_sizes(signed_volumes(mesh.vertices, mesh.tetrahedra));
   return make_soft_body(world_info, mesh, with_density(options, material, volume));
+}
+
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const Materials& materials, const SoftBodyOptions& options) {
+  check_indices(mesh.vertices, mesh.tetrahedra, "tetrahedron");
+  materials.check(mesh.tetrahedra.size(), ElasticModel::neo_hookean);  // of all models the least particular
+  const std::vector<Real> volumes = signed_volumes(mesh.vertices, mesh.tetrahedra);
+  std::vector<Real> densities;
+  Real mass = 0;
+  for (std::size_t t = 0; t < volumes.size(); ++t) {
+    densities.push_back(materials.of(t).density);
+    mass += densities[t] * std::abs(volumes[t]);
+  }
+  const Real volume = sum_of_sizes(volumes);
+  const SoftBodyOptions with_mass = with_density(options, Material{.density = mass / volume}, volume);
+  return from_tetrahedra(world_info, mesh, with_mass, densities);
 }
 
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,

@@ -15,7 +15,9 @@ namespace penalty {
 
 struct SoftBodyOptions {
   std::optional<Real> mass = {};  // of the whole body [kg]; 1 kg, unless a material decides
-  bool equal_masses = true;  // else each node carries its share of the volume or area; equal ones allow larger substeps
+  /// Else each node carries its share of the volume or area; equal ones allow larger substeps. Of several materials those
+  /// within each are equal, on the whole.
+  bool equal_masses = true;
   std::vector<int> pinned = {};  // nodes of zero inverse mass
   Real margin = 0.02;            // collision margin [m]
   Real friction = 0.5;           // Coulomb coefficient, multiplied with that of the other body
@@ -35,6 +37,15 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
 /// field's business.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
                                            const Material& material, const SoftBodyOptions& options = {});
+
+/// The same of several materials: each node weighs by the density around it. Throws as `Materials::check`, too.
+///
+///     const TetMesh mesh = read_mesh("bar.msh");
+///     const Materials materials = materials_of(mesh, {{"rubber", {.young = 1e5}}, {"cork", {.young = 1e7, .density = 200}}});
+///     auto body = make_soft_body(world_info, mesh, materials, {.pinned = mesh.vertex_set("clamped")});
+///     solver.attach(*body, make_elastic_field(mesh.vertices, mesh.tetrahedra, materials));
+std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,
+                                           const Materials& materials, const SoftBodyOptions& options = {});
 
 /// The same from the triangles of a surface, open (cloth) or closed (a balloon): they become the faces, as they are.
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TriangleSurface& surface,
