@@ -48,6 +48,16 @@ void check_tetrahedra(const TetMesh& mesh) {
   }
 }
 
+void check_groups(const std::vector<MeshGroup>& groups, std::size_t size) {
+  for (const auto& [name, members] : groups) {
+    require(!members.empty(), "the group " + name + " is empty");
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      require(members[i] >= 0 && static_cast<std::size_t>(members[i]) < size, "the group " + name + " is out of range");
+      require(i == 0 || members[i - 1] < members[i], "the group " + name + " is not in order");
+    }
+  }
+}
+
 void check_closed_outward(const TriangleSurface& surface) {
   std::map<std::pair<int, int>, int> directed;
   for (const Triangle& t : surface.triangles)
@@ -121,6 +131,8 @@ void ReaderCheck::read_tetrahedra(std::string_view bytes) const {
   check_points(mesh.vertices, bytes.size());
   check_indices(mesh.tetrahedra, mesh.vertices.cols());
   check_tetrahedra(mesh);
+  check_groups(mesh.regions, mesh.tetrahedra.size());
+  check_groups(mesh.vertex_sets, static_cast<std::size_t>(mesh.vertices.cols()));
 
   write_vtk(folder_ / "back.vtk", mesh);
   const TetMesh back = read_mesh(folder_ / "back.vtk");

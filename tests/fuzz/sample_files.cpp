@@ -6,7 +6,7 @@ namespace penalty::testing {
 std::vector<std::string> sample_files(FileFormat format) {
   switch (format) {
     case FileFormat::vtk:
-      return {vtk_ascii, vtk_offsets, vtk_binary(), vtk_binary_offsets()};
+      return {vtk_ascii, vtk_ascii + vtk_data, vtk_offsets, vtk_binary(), vtk_binary_offsets()};
     case FileFormat::gmsh:
       return {gmsh_2,
               gmsh_41,

@@ -102,6 +102,14 @@ inline const std::string vtk_ascii =
     "CELL_TYPES 3\n"                // 15
     "10\n5\n10\n";                  // 16, 17, 18
 
+/// Numbers on the cells and the points of the same file: some group them.
+inline const std::string vtk_data =
+    "CELL_DATA 3\nSCALARS material%20id int 1\nLOOKUP_TABLE default\n4 2 -1\n"
+    "FIELD FieldData 3\nheat 1 3 double\n1.5 2 3\nsame 1 3 float\n1 1 1\nsides 2 3 int\n1 2 3 4 5 6\n"
+    "VECTORS flow float\n1 0 0 1 0 0 1 0 0\n"
+    "POINT_DATA 5\nSCALARS fixed unsigned_char\nLOOKUP_TABLE default\n0 0 1 0 7\n"
+    "SCALARS whole float\nLOOKUP_TABLE default\n1 1 1 2 0\n";
+
 inline const std::string vtk_offsets =
     "# vtk DataFile Version 5.1\n"
     "two tetrahedra\n"

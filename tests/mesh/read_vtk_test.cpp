@@ -42,13 +42,7 @@ TEST_F(ReadVtk, TakesCornersOfSecondOrderTetrahedra) {
 }
 
 TEST_F(ReadVtk, KeepsWholeNumbersOnCellsAndPointsAsGroups) {
-  const TetMesh mesh = read(vtk_ascii +
-                            "CELL_DATA 3\nSCALARS material%20id int 1\nLOOKUP_TABLE default\n4 2 -1\n"
-                            "FIELD FieldData 2\nheat 1 3 double\n1.5 2 3\nsides 2 3 int\n1 2 3 4 5 6\n"
-                            "VECTORS flow float\n1 0 0 1 0 0 1 0 0\n"
-                            "POINT_DATA 5\nSCALARS fixed unsigned_char\nLOOKUP_TABLE default\n0 0 1 0 7\n"
-                            "SCALARS half float\nLOOKUP_TABLE default\n1 1 1 1 1\n"
-                            "SCALARS whole float\nLOOKUP_TABLE default\n1 1 1 2 0\n");
+  const TetMesh mesh = read(vtk_ascii + vtk_data);
   expect_two_tetrahedra(mesh);
   EXPECT_EQ(to_text(mesh.regions), "material id 4: 0; material id -1: 1");
   EXPECT_EQ(to_text(mesh.vertex_sets), "material id 2: 0 1 2; fixed 1: 2; fixed 7: 4; whole 1: 0 1 2; whole 2: 3");
