@@ -107,7 +107,9 @@ struct Scene::Impl {
   }
 
   void add_soft(SoftObject& object) {
-    const SoftBodyOptions options{.mass = object.mass, .pinned = object.pinned, .friction = object.friction};
+    constexpr Real margin = 0.02;  // that scenes reckon with [m]
+    const SoftBodyOptions options{
+        .mass = object.mass, .pinned = object.pinned, .margin = margin, .friction = object.friction};
     auto started = object.mesh.mesh;
     std::unique_ptr<btSoftBody> body = std::visit(
         [&](auto& mesh) {

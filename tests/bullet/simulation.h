@@ -52,7 +52,8 @@ std::string world_name(WorldKind kind);  // "classic_float64"
 struct JellyOptions {
   Real stiffness = 10;  // of every edge and tetrahedron [J]
   Vector3 shift = Vector3::Zero();
-  SoftBodyOptions body = {.friction = 1};  // the friction of a pair is then that of the rigid body
+  /// Margins are 2 cm, whatever its size; the friction of a pair is that of the rigid body.
+  SoftBodyOptions body = {.margin = 0.02, .friction = 1};
   AttachOptions attach = {};
 };
 

@@ -12,7 +12,8 @@ namespace {
 constexpr Real same_distance = 1e-9;  // relative to what is measured
 constexpr Real flat_height = 1e-6;    // height over a plane that is none, relative to the size of the triangle
 constexpr int most_planes = 16;       // of a point and a mesh
-constexpr Real mesh_slop = 1e-4;      // depth that does not matter [m]
+constexpr Real mesh_slop = 1e-4,
+               share_of_margin = 0.005;  // depth that does not matter [m], of a small margin this share
 constexpr int bisections = 12;
 
 ClosestPoints closest(const MeshTriangle& triangle, const Vector3& point) {
@@ -127,11 +128,12 @@ void append_planes(std::vector<MeshTriangle>& triangles, const MovingPoint& poin
   });
   std::sort(triangles.begin(), triangles.end(),
             [](const MeshTriangle& l, const MeshTriangle& r) { return l.distance < r.distance; });
+  const Real kept = margin - std::min(mesh_slop, share_of_margin * margin);
   for (const MeshTriangle& triangle : triangles) {
     if (found.size() - begin == most_planes) return;
     if (!is_left(triangle)) continue;
-    const Approach hit = approach_of(triangle, x, way, margin - mesh_slop);
-    if (hit.distance >= margin - mesh_slop && length < margin) continue;  // slow ones keep to the way that is foreseen
+    const Approach hit = approach_of(triangle, x, way, kept);
+    if (hit.distance >= kept && length < margin) continue;  // slow ones keep to the way that is foreseen
     const Vector3 surface = hit.position - hit.closest.difference;
     Vector3 normal = direction_to(triangle, hit.position, hit.closest.difference);
     // What it hits it will lie on, and the plane of the triangle is in nobody's way either where the point stays above

@@ -97,7 +97,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
   const Real fall = stepped.gravity.norm() * duration * duration;
   const Box& box = held.box;
   const Real fastest = std::sqrt(held.fastest2);
-  const Real sweep = fastest * duration + fall + margin;
+  const Real sweep = fastest * duration + fall + margin, waking = waking_speed(stepped.size);
   if (!std::isfinite(sweep + box.low.sum() + box.high.sum())) return true;
 
   // Bullet's boxes are those of the last step: look further around, then test each object where it is and as fast as it
@@ -130,7 +130,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
     const bool holds_some = is_anchored(held, *object);
     for (SurfacePair* pair : holds_some ? std::vector<SurfacePair*>{} : rigid_surfaces.near(held, *object, reached)) {
       pair->b().friction = std::isfinite(pair->b().friction) ? pair->b().friction : 0;
-      const bool approached = fastest > waking_speed && object_box.overlaps(box, 2 * margin);
+      const bool approached = fastest > waking && object_box.overlaps(box, 2 * margin);
       island.surfaces.push_back({pair, &held, nullptr, rigid_bodies.touch(*object, approached, island.touched)});
     }
     // That a point will go relative to the object, left to itself.
@@ -155,7 +155,7 @@ bool detect_contacts(HeldBody& held, WorldIsland& island, const RigidBodies& rig
       const Vector3 v = point.of(particles.velocities);
       held.mesh_sides.append_planes(number, rotation.transpose() * way_of(v, x), margin, margin + reach, surface);
       for (const SurfacePoint& nearest : surface) {
-        const bool approached = -v.dot(rotation * nearest.normal) > waking_speed;
+        const bool approached = -v.dot(rotation * nearest.normal) > waking;
         const Real radius = nearest.radius > 0 ? nearest.radius + margin : 0;
         const Vector3 anchor = nearest.point + (margin - radius) * nearest.normal;
         const int touched = rigid_bodies.touch(*object, approached, island.touched);

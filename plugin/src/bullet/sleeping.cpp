@@ -53,12 +53,12 @@ void wake_if_hit(btSoftBody& body) {
   if (body.getActivationState() != ISLAND_SLEEPING) return;
   Box box;
   for (int i = 0; i < body.m_nodes.size(); ++i) box.add(to_vector(body.m_nodes[i].m_x));
-  const Real margin = body.getCollisionShape()->getMargin();
+  const Real margin = body.getCollisionShape()->getMargin(), waking = waking_speed((box.high - box.low).norm());
   for (btCollisionObject* object : obstacles_near(body, box, margin)) {
     const btRigidBody* rigid = btRigidBody::upcast(object);
     if (!object->isActive() || (rigid && stands_still(*rigid))) continue;
     const Real speed = rigid ? Real(rigid->getLinearVelocity().length()) : link_velocities(*object)[0].norm();
-    if (speed > waking_speed && bounds_of(*object).overlaps(box, 2 * margin)) body.activate(true);
+    if (speed > waking && bounds_of(*object).overlaps(box, 2 * margin)) body.activate(true);
   }
 }
 

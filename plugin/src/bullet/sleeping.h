@@ -1,5 +1,7 @@
 // Who wakes whom, and who may fall asleep. Bullet decides; it does not know of soft contacts and couplings.
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "penalty/math/types.h"
@@ -15,8 +17,8 @@ class Surfaces;
 struct HeldBody;
 struct WorldIsland;
 
-/// Slower than this [m/s], touching does not wake what sleeps.
-inline constexpr Real waking_speed = 0.1;
+/// Slower than this [m/s], touching a soft body of this size [m] wakes neither it nor what it touches.
+inline Real waking_speed(Real size) { return 0.1 * std::sqrt(std::min<Real>(size, 1)); }
 
 /// An active soft body at rest for long enough is ready to sleep, as Bullet's deformable world has it; its classic world
 /// leaves soft bodies, and all that touches them, awake for ever. `duration`: of the step that it has made [s].

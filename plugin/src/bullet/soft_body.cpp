@@ -2,6 +2,7 @@
 
 #include <BulletSoftBody/btSoftBody.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
@@ -16,6 +17,13 @@ namespace {
 
 Real mass_of(const SoftBodyOptions& options) { return options.mass.value_or(1); }
 
+Real margin_of(const SoftBodyOptions& options, const Eigen::Matrix3Xd& vertices) {
+  constexpr Real of_a_metre = 0.02;
+  if (options.margin || vertices.cols() == 0) return options.margin.value_or(of_a_metre);
+  const Real size = (vertices.rowwise().maxCoeff() - vertices.rowwise().minCoeff()).maxCoeff();
+  return size > 0 ? of_a_metre * std::min<Real>(size, 1) : of_a_metre;
+}
+
 void require(bool ok, const char* name, Real value, const char* range) {
   if (!ok)
     throw std::invalid_argument(std::string("soft body: ") + name + " is " + to_text(value) + ", must be " + range);
@@ -26,7 +34,7 @@ bool is_positive_or_zero(Real value) { return value >= 0 && std::isfinite(value)
 
 void check(const Eigen::Matrix3Xd& vertices, const SoftBodyOptions& options) {
   require(is_positive(mass_of(options)), "mass", mass_of(options), "positive and finite [kg]");
-  require(is_positive_or_zero(options.margin), "margin", options.margin, "zero or positive [m]");
+  if (options.margin) require(is_positive_or_zero(*options.margin), "margin", *options.margin, "zero or positive [m]");
   require(is_positive_or_zero(options.friction), "friction", options.friction, "zero or positive");
   const auto num_vertices = static_cast<int>(vertices.cols());
   if (num_vertices == 0) throw std::invalid_argument("soft body: the mesh has no vertices");
@@ -106,7 +114,7 @@ std::unique_ptr<btSoftBody> assemble(btSoftBodyWorldInfo& world_info, const Eige
   auto body = std::make_unique<btSoftBody>(&world_info, positions.size(), &positions[0], &bullet_masses[0]);
   for (const auto& [a, b, c] : faces) body->appendFace(a, b, c);
   for (const auto& [a, b] : links) body->appendLink(a, b);
-  body->getCollisionShape()->setMargin(static_cast<btScalar>(options.margin));
+  body->getCollisionShape()->setMargin(static_cast<btScalar>(margin_of(options, vertices)));
   body->m_cfg.kDF = static_cast<btScalar>(options.friction);
   body->m_cfg.collisions = options.stock_deformable ? btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN
                                                     : btSoftBody::fCollision::SDF_RS;

@@ -18,6 +18,10 @@ bool has_held_particle(const WeightedPoint& point, const Particles& particles) {
   return false;
 }
 
+Real slop_of(const SteppedBody& body) {
+  return body.options.contact_slop * (body.size > 0 ? std::min<Real>(body.size, 1) : 1);
+}
+
 }  // namespace
 
 Real driving_work(const WeightedPoint& point, const Vector3& impulse, const Particles& particles) {
@@ -89,7 +93,7 @@ void ParticleContacts::begin(Real h, Real since) {
     if (row.is_held() && row.is_obstacle) continue;
     has_held_ = has_held_ || row.is_held();
     row.is_driven = has_held_particle(point, particles);
-    if (-gap <= contact.deepest) row.recovery = recovery_of(-gap, row.body->options.contact_slop, h);
+    if (-gap <= contact.deepest) row.recovery = recovery_of(-gap, slop_of(*row.body), h);
     if (row.recovery > 0 && !row.is_obstacle && !row.is_held())
       row.recovery =
           std::min(row.recovery, std::max<Real>(row.normal.dot(relative_velocity(row)), 0) + recovery_acceleration * h);

@@ -19,8 +19,10 @@ struct SoftBodyOptions {
   /// within each are equal, on the whole.
   bool equal_masses = true;
   std::vector<int> pinned = {};  // nodes of zero inverse mass
-  Real margin = 0.02;            // collision margin [m]
-  Real friction = 0.5;           // Coulomb coefficient, multiplied with that of the other body
+  /// Collision margin [m]; unless said 2 cm, of what is smaller than a metre 2 % of its size, which is the longest side of
+  /// the box around it.
+  std::optional<Real> margin = {};
+  Real friction = 0.5;  // Coulomb coefficient, multiplied with that of the other body
   /// For Bullet's own solver of the deformable world: its collision flags, and links along the edges, without which
   /// Bullet's trees are never finished. The plugin's solvers need neither.
   bool stock_deformable = false;

@@ -39,7 +39,7 @@ struct StepOptions {
   Real contact_safety = 0.7;      // the same while the body is in contact: impacts excite the fastest modes
   Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps
   int max_substeps = 20000;       // beyond this a step is taken as it is, if it is finite
-  Real contact_slop = 1e-4;       // depth that is left alone [m]
+  Real contact_slop = 1e-4;       // depth that is left alone [m]; of what is smaller than a metre so much less
   int newton_iterations = 8;      // most of an implicit step
   Real newton_tolerance = 1e-3;   // ends them: what is left of the forces that are not balanced, in the norm of the
                                   // preconditioner
