@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <charconv>
+#include <optional>
 #include <type_traits>
 
 #include "raw_mesh.h"
@@ -43,18 +44,19 @@ class VtkReader {
       text_.within({});
       if (text_.at_end()) text_.fail(missing(points, cells));
       const std::string keyword = lower_case(text_.word("a section"));
-      if (keyword == "points" && !points)
+      if (keyword == "points" && !points) {
         read_points(), points = true;
-      else if (keyword == "cells" && !cells)
+      } else if (keyword == "cells" && !cells) {
         read_cells(), cells = true;
-      else if (keyword == "cell_types" && cells && !types)
+      } else if (keyword == "cell_types" && cells && !types) {
         read_types(), types = true;
-      else if (keyword == "field")
-        read_field(-1, [](const VtkArray&) {});
-      else if (keyword == "metadata")
+      } else if (keyword == "field") {
+        if (!read_field(-1, [](const VtkArray&) {})) text_.fail("an array of unknown type");
+      } else if (keyword == "metadata") {
         skip_metadata();
-      else
+      } else {
         text_.fail("found " + in_quotes(keyword) + " where a section should begin; " + missing(points, cells));
+      }
     }
     read_data();
     const std::string source = text_.file();
@@ -223,6 +225,7 @@ class VtkReader {
     return true;
   }
 
+  // As far as it is known how long everything is.
   void read_data() {
     enum class On { nothing, points, cells } on = On::nothing;
     std::int64_t count = 0;
@@ -243,23 +246,25 @@ class VtkReader {
         const std::string name(text_.word("a name")), type(text_.word("a type"));
         const std::int64_t components = text_.at_line_end() ? 1 : text_.count("the number of components", 1);
         if (lower_case(text_.peek()) == "lookup_table") text_.word("LOOKUP_TABLE"), text_.word("the name of a table");
-        keep(read_array(name, components, count, type));
+        const std::optional<VtkArray> array = read_array(name, components, count, type);
+        if (!array) return;
+        keep(*array);
       } else if (keyword == "field") {
-        read_field(on == On::nothing ? -1 : count, keep);
+        if (!read_field(on == On::nothing ? -1 : count, keep)) return;
       } else if (keyword == "vectors" || keyword == "normals" || keyword == "tensors" || keyword == "global_ids" ||
                  keyword == "pedigree_ids") {
         const std::string name(text_.word("a name")), type(text_.word("a type"));
-        read_array(name, keyword == "tensors" ? 9 : keyword.ends_with("ids") ? 1 : 3, count, type);
+        if (!read_array(name, keyword == "tensors" ? 9 : keyword.ends_with("ids") ? 1 : 3, count, type)) return;
       } else if (keyword == "metadata") {
         skip_metadata();
       } else {
-        return;  // nothing that says how long it is
+        return;
       }
     }
   }
 
   template <class Keep>
-  void read_field(std::int64_t count, const Keep& keep) {
+  bool read_field(std::int64_t count, const Keep& keep) {
     text_.word("the name of the field");
     const std::int64_t arrays = text_.count("the number of arrays", 4);
     for (std::int64_t i = 0; i < arrays; ++i) {
@@ -268,17 +273,19 @@ class VtkReader {
       const std::int64_t components = text_.count("the number of components", 1);
       const std::int64_t tuples = text_.count("the number of tuples", 1);
       const std::string type(text_.word("the type of an array"));
-      const VtkArray array = read_array(name, components, tuples, type);
-      if (tuples == count) keep(array);
+      const std::optional<VtkArray> array = read_array(name, components, tuples, type);
+      if (!array) return false;
+      if (tuples == count) keep(*array);
     }
+    return true;
   }
 
-  // Values of arrays of one component; others are passed over.
-  VtkArray read_array(const std::string& name, std::int64_t components, std::int64_t tuples, const std::string& type) {
+  // Values of arrays of one component; others are passed over. Nothing for a type whose size is not known.
+  std::optional<VtkArray> read_array(const std::string& name, std::int64_t components, std::int64_t tuples,
+                                     const std::string& type) {
     const std::string kind = lower_case(type);
     const std::size_t size = kind == "vtkidtype" ? 4 : size_of(kind);  // ids are written as int
-    if (size == 0 && (binary_ || (kind != "bit" && kind != "string")))
-      text_.fail("the array " + in_quotes(name) + " is of the type " + in_quotes(type) + ", which is not read");
+    if (size == 0 && (binary_ || (kind != "bit" && kind != "string"))) return std::nullopt;
     if (components > 0 && tuples > static_cast<std::int64_t>(text_.remaining()) / components)
       text_.fail("the file ends within the array " + in_quotes(name));
     VtkArray array{.name = decoded(name), .is_integer = kind != "float" && kind != "double", .values = {}};
