@@ -4,6 +4,7 @@
 #include "fuzz/finding.h"
 #include "fuzz/readers.h"
 #include "math/random.h"
+#include "mesh/files.h"
 
 namespace penalty::testing {
 namespace {
@@ -31,9 +32,10 @@ TEST_P(BrokenFiles, StartFromGoodOnes) {
 
 TEST_P(BrokenFiles, TruncatedAnywhereGiveAMeshOrAComplaint) {
   for (const std::string& sample : sample_files(GetParam())) {
-    int meshes = 0;
+    std::size_t meshes = 0;
     for (std::size_t length = 0; length < sample.size(); ++length) meshes += read(sample.substr(0, length));
-    EXPECT_LT(meshes, 65) << "only what follows the last element may be missing from\n" << sample;
+    const std::size_t rest = sample.ends_with(vtk_data) ? vtk_data.size() : 65;
+    EXPECT_LT(meshes, rest) << "only what follows the last element may be missing from\n" << sample;
   }
 }
 
