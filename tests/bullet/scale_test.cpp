@@ -6,8 +6,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real gravity = 9.81;
-
 class Scale : public WorldTest {};
 INSTANTIATE_TEST_SUITE_P(World, Scale, both_worlds(), param_name);
 
@@ -19,7 +17,7 @@ struct Fall {
 // A cube of jelly falls by half its size onto a plane.
 Fall fall(WorldKind kind, Real size) {
   Simulation sim(kind);
-  sim.set_gravity({0, -gravity, 0});
+  sim.set_gravity({0, -9.81, 0});
   const Material jelly{.young = 2e5 * size, .poisson = 0.3, .damping = 0.01 * std::sqrt(size)};
   const TetMesh mesh = make_box(Vector3::Constant(size), {4, 4, 4});
   // The default, but for what is larger than a metre.
