@@ -23,7 +23,7 @@ struct Misuse {
 
 TEST(CommandLine, RefusesWhatItDoesNotKnow) {
   for (const Misuse& misuse :
-       {Misuse{"", "subcommand"}, Misuse{"run", "scene"}, Misuse{"run nothing", "drop, beam, flight"},
+       {Misuse{"", "subcommand"}, Misuse{"run", "scene"}, Misuse{"run nothing", "drop, beam, materials, flight"},
         Misuse{"run drop --bogus", "--bogus"}, Misuse{"run drop --world moon", "classic, deformable"},
         Misuse{"run drop --integrator rk4", "auto, explicit, implicit"},
         Misuse{"run drop --phases 3", "must be 1 to 2"}, Misuse{"run drop --start upside", "scramble"},
