@@ -236,16 +236,21 @@ class GmshReader {
       text_.within("element", tag);
       const GmshElement type = read_type();
       if (type.nodes == 0) refuse_type();
-      // The physical group and the entity come first; in version 1 the number of nodes is the last of three.
       const std::int64_t tags = layout_ == Layout::one ? 3 : text_.integer("the number of tags");
-      std::array<std::int64_t, 2> groups{};
-      for (std::int64_t k = 0; k < tags; ++k) {
-        const std::int64_t value = text_.integer("a tag");
-        if (k < 2) groups[k] = value;
-      }
+      const std::array<std::int64_t, 2> groups = read_tags(tags);
       add_element(type, tag, 4);
       put_in(type, groups);
     }
+  }
+
+  // The physical group and the entity come first; in version 1 the number of nodes is the last of three.
+  std::array<std::int64_t, 2> read_tags(std::int64_t tags) {
+    std::array<std::int64_t, 2> groups{};
+    for (std::int64_t k = 0; k < tags; ++k) {
+      const std::int64_t value = integer("a tag");
+      if (k < 2) groups[k] = value;
+    }
+    return groups;
   }
 
   void put_in(const GmshElement& type, const std::array<std::int64_t, 2>& groups) {
@@ -269,11 +274,7 @@ class GmshReader {
       for (std::int64_t i = 0; i < run; ++i, ++read) {
         const std::int64_t tag = integer("the number of the element");
         text_.within("element", tag);
-        std::array<std::int64_t, 2> groups{};
-        for (std::int64_t k = 0; k < tags; ++k) {
-          const std::int64_t value = integer("a tag");
-          if (k < 2) groups[k] = value;
-        }
+        const std::array<std::int64_t, 2> groups = read_tags(tags);
         add_element(type, tag, 4);
         put_in(type, groups);
       }

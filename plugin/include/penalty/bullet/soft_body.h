@@ -43,7 +43,8 @@ std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, cons
 /// The same of several materials: each node weighs by the density around it. Throws as `Materials::check`, too.
 ///
 ///     const TetMesh mesh = read_mesh("bar.msh");
-///     const Materials materials = materials_of(mesh, {{"rubber", {.young = 1e5}}, {"cork", {.young = 1e7, .density = 200}}});
+///     const Material rubber{.young = 1e5}, cork{.young = 1e7, .density = 200};
+///     const Materials materials = materials_of(mesh, {{"rubber", rubber}, {"cork", cork}});
 ///     auto body = make_soft_body(world_info, mesh, materials, {.pinned = mesh.vertex_set("clamped")});
 ///     solver.attach(*body, make_elastic_field(mesh.vertices, mesh.tetrahedra, materials));
 std::unique_ptr<btSoftBody> make_soft_body(btSoftBodyWorldInfo& world_info, const TetMesh& mesh,

@@ -14,7 +14,8 @@ struct RegionMaterial {
 
 /// What each tetrahedron of `mesh` is made of: the material of its region, or of none of these `elsewhere`.
 ///
-///     const Materials materials = materials_of(mesh, {{"rubber", {.young = 1e5}}, {"cork", {.young = 1e7, .density = 200}}});
+///     const Material rubber{.young = 1e5}, cork{.young = 1e7, .density = 200};
+///     const Materials materials = materials_of(mesh, {{"rubber", rubber}, {"cork", cork}});
 ///
 /// Regions that are not named here do not count. Throws std::invalid_argument for a region that the mesh does not have,
 /// with those that it has; for a tetrahedron that is in two of the regions named, or in none without `elsewhere`.
