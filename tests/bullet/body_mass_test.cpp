@@ -121,7 +121,8 @@ TEST_P(MassByDensity, OfSeveralMaterialsStretchesAHangingBarAsBeamTheorySays) {
   sim.penalty().attach(
       body, make_elastic_field(bar.mesh.vertices, bar.mesh.tetrahedra, bar.materials, ElasticModel::neo_hookean));
   sim.step(1.0 / 60, 240);
-  // A section is pulled by all that hangs below it: strain = g (mass below) / (E area).
+  // A section is pulled by all that hangs below it: strain = g (mass below) / (E area), which is linear in strains of up to
+  // 5 %.
   const Real at_half = g * (heavy * half * half + light * half * half / 2) / stiff;
   const Real at_end = at_half + g * heavy * half * half / 2 / soft;
   for (int i = 0; i < body.m_nodes.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <numeric>
 
 #include "fields/meshes.h"
+#include "penalty/stepping/relax.h"
 
 namespace penalty::testing {
 namespace {
@@ -231,6 +232,22 @@ TEST(Materials, ShareTheEdgesBetweenThem) {
   EXPECT_TRUE(field.damps());
 }
 
+TEST(Materials, OfTwoHalvesFindBackFromAPlane) {
+  const TetMesh mesh = make_box({1, 1, 1}, {2, 2, 2});
+  Materials materials{.kinds = {{.young = 1e5, .poisson = 0.3}, {.young = 1e6, .poisson = 0.45}}, .kind_of = {}};
+  for (const Tetrahedron& t : mesh.tetrahedra)
+    materials.kind_of.push_back(mesh.vertices(Eigen::all, t).row(2).mean() < 0.5 ? 0 : 1);
+  PotentialField field = make_recovering_field(mesh.vertices, mesh.tetrahedra, materials);
+  PackedVectors x = field.rest_positions();
+  x.row(1).setZero();
+  relax(field, x);
+  const std::vector<Edge> edges = edges_of(mesh.tetrahedra);
+  for (const auto& [a, b] : edges) {
+    const Real rest = (mesh.vertices.col(b) - mesh.vertices.col(a)).norm();
+    EXPECT_NEAR((x.col(b) - x.col(a)).norm(), rest, 1e-3 * rest);
+  }
+}
+
 TEST(Materials, NameWhatIsWrong) {
   const TetMesh mesh = make_box({1, 1, 1}, {1, 1, 1});
   const auto refusal = [&](const Materials& materials) -> std::string {
@@ -244,6 +261,10 @@ TEST(Materials, NameWhatIsWrong) {
   const std::size_t size = mesh.tetrahedra.size();
   std::vector<int> all(size, 0);
   EXPECT_EQ(refusal({{Material{}}, {0}}), "materials: they are those of 1 tetrahedra, not of " + std::to_string(size));
+  PotentialField field(mesh.vertices);
+  EXPECT_THROW(
+      field.add<StableNeoHookean>(std::vector<StableNeoHookean>{}, mesh.tetrahedra, std::vector<Real>(size, 1)),
+      std::invalid_argument);
   EXPECT_EQ(refusal({{}, all}), "materials: tetrahedron 0 is of material 0, there are 0");
   EXPECT_EQ(refusal({{Material{}, Material{.young = -1}}, all}),
             "material 1: Young's modulus is -1, must be positive and finite [Pa]");
