@@ -29,8 +29,14 @@ struct DeformablePenaltyForce::Attached {
   PotentialField field;
   std::string problem;
   PackedVectors positions, in, out;  // scratch, one column a node
-  System matrix;                     // scratch, of the elements that there were when it was made
-  std::size_t num_elements = 0;
+
+  // Many products are asked for at the same positions; of the field, nothing changes but that elements are added.
+  struct Assembled {
+    System matrix;
+    std::size_t num_elements = 0;
+    PackedVectors at;
+  };
+  Assembled stiffness_matrix, damping_matrix;
 
   Attached(btSoftBody& soft_body, PotentialField potential_field)
       : body(&soft_body), name(Identity::of(soft_body)), field(std::move(potential_field)) {
@@ -38,24 +44,24 @@ struct DeformablePenaltyForce::Attached {
   }
 
   const System& stiffness() {
-    clear_matrix();
-    field.add_stiffness(positions, StiffnessModel::gauss_newton, matrix);
-    return matrix;
+    return assemble(stiffness_matrix,
+                    [this](System& system) { field.add_stiffness(positions, StiffnessModel::gauss_newton, system); });
   }
   const System& damping(Real time) {
-    clear_matrix();
-    field.add_damping(positions, time, matrix);
-    return matrix;
+    return assemble(damping_matrix, [&](System& system) { field.add_damping(positions, time, system); });
   }
-  void clear_matrix() {
-    if (num_elements != field.num_elements()) {
-      matrix = System::with_pattern(field.num_particles(), [this](System& system) {
-        field.add_stiffness(field.rest_positions(), StiffnessModel::gauss_newton, system);
-        field.add_damping(field.rest_positions(), 1, system);
-      });
-      num_elements = field.num_elements();
+  template <class Walk>
+  const System& assemble(Assembled& assembled, const Walk& walk) {
+    if (assembled.num_elements != field.num_elements()) {
+      assembled.matrix = System::with_pattern(field.num_particles(), walk);
+      assembled.num_elements = field.num_elements();
+    } else if (assembled.at.cols() == positions.cols() && assembled.at == positions) {
+      return assembled.matrix;
     }
-    matrix.set_zero();
+    assembled.matrix.set_zero();
+    walk(assembled.matrix);
+    assembled.at = positions;
+    return assembled.matrix;
   }
 
   void set_problem(const char* what) noexcept {
@@ -162,7 +168,7 @@ void DeformablePenaltyForce::addScaledDampingForce(btScalar scale, TVStack& forc
 void DeformablePenaltyForce::addScaledElasticForceDifferential(btScalar scale, const TVStack& dx, TVStack& df) {
   for_each_active([&](Attached& a) {
     a.read(dx);
-    a.field.add_product(a.positions, StiffnessModel::gauss_newton, a.in, -1, a.out);
+    a.stiffness().add_product(a.in, -1, a.out);
     a.add_to(df, scale);
   });
 }

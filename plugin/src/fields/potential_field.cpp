@@ -160,19 +160,6 @@ void PotentialField::add_stiffness(const Positions& x, StiffnessModel model, Sys
     for_each_acting(add);
 }
 
-void PotentialField::add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
-                                 Forces df) const {
-  const auto add = [&](const Potential& p) { p.add_product(x, model, dx, scale, df); };
-  if (model == StiffnessModel::taut)
-    for_each_stiff(add);
-  else
-    for_each_acting(add);
-}
-
-void PotentialField::add_bounds(const Positions& x, std::span<Real> bounds) const {
-  for_each_stiff([&](const Potential& p) { p.add_bounds(x, bounds); });
-}
-
 void PotentialField::add_damping(const Positions& x, Real time, System& damping) const {
   if (damping.is_counting())
     for (const auto& potential : potentials_) potential->add_damping(x, time, damping);

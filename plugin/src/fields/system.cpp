@@ -1,5 +1,8 @@
 #include "penalty/fields/system.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace penalty {
 
 void System::set_zero() {
@@ -39,6 +42,22 @@ void System::add_product(const Vectors& x, Real scale, Forces y) const {
     along *= scale * term.coefficient;
     for (std::size_t k = 0; k < term.particles.size(); ++k)
       y.col(term.particles[k]).head<3>() += along * term.direction.col(static_cast<Eigen::Index>(k));
+  }
+}
+
+void System::add_bounds(std::span<Real> bounds) const {
+  for (int i = 0; i < num_particles(); ++i)
+    blocks_.visit_row(i, [&](int, const Matrix3& block) {
+      // Both are no less than the spectral norm: the first is that of an outer product, the other of a multiple of 1.
+      const Real rows = block.cwiseAbs().rowwise().sum().maxCoeff(),
+                 columns = block.cwiseAbs().colwise().sum().maxCoeff();
+      bounds[i] += std::min(block.norm(), std::sqrt(rows * columns));
+    });
+  for (const RankOneTerm& term : terms()) {
+    if (term.coefficient < 0) continue;
+    const Real sum = term.coefficient * term.direction.colwise().norm().sum();
+    for (std::size_t k = 0; k < term.particles.size(); ++k)
+      bounds[term.particles[k]] += sum * term.direction.col(static_cast<Eigen::Index>(k)).norm();
   }
 }
 

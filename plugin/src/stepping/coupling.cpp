@@ -135,7 +135,7 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew) {
   coupling.has_driven_points = std::count(coupling.inverse_masses.begin(), coupling.inverse_masses.end(), 0) > 0;
   if (anew)
     coupling.largest_eigenvalue =
-        gershgorin_bound(*coupling.field, coupling.field->rest_positions(), coupling.inverse_masses);
+        gershgorin_bound(taut_stiffness(*coupling.field, coupling.field->rest_positions()), coupling.inverse_masses);
 }
 
 }  // namespace penalty

@@ -131,7 +131,8 @@ void name_bad_particles(std::span<SteppedBody* const> bodies) {
 
 void estimate_stability(SteppedBody& body) {
   const PackedVectors& rest = body.field->rest_positions();
-  body.largest_eigenvalue = largest_eigenvalue_bound(*body.field, rest, body.particles.inverse_masses);
+  const System stiffness = taut_stiffness(*body.field, rest);
+  body.largest_eigenvalue = largest_eigenvalue_bound(stiffness, body.particles.inverse_masses);
   body.mass = 0;
   for (const Real inverse_mass : body.particles.inverse_masses) body.mass += inverse_or_zero(inverse_mass);
   const auto points = rest.topRows<3>();
@@ -144,7 +145,7 @@ void estimate_stability(SteppedBody& body) {
   if (body.mass > 0) return;
   // Held altogether it has no mass to go by, but round-off in how it is driven, too.
   const std::vector<Real> ones(body.particles.inverse_masses.size(), 1);
-  body.energy_noise = 1e-15 * largest_eigenvalue_bound(*body.field, rest, ones) * extent2;
+  body.energy_noise = 1e-15 * largest_eigenvalue_bound(stiffness, ones) * extent2;
 }
 
 }  // namespace penalty

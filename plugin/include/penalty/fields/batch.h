@@ -65,8 +65,6 @@ class Batch final : public ElementBatch {
   Real add_forces(const Positions& x, Forces f) const override;
   void add_forces_only(const Positions& x, Forces f) const override;
   void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const override;
-  void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale, Forces df) const override;
-  void add_bounds(const Positions& x, std::span<Real> bounds) const override;
   void add_damping(const Positions& x, Real time, System& damping) const override;
   void add_damping_modes(const Positions& x, Real time, Real duration, DampingModes& modes) const override;
   void dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration,

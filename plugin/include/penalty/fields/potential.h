@@ -42,7 +42,7 @@ class ElementVisitor {
 /// give results that are not finite, never an error. One thread at a time may use a potential: elements of many points
 /// keep scratch space.
 ///
-/// A potential of your own needs the five without a body; the others are for what damps, flows, breaks or is to be
+/// A potential of your own needs the three without a body; the others are for what damps, flows, breaks or is to be
 /// looked at.
 class Potential {
  public:
@@ -59,14 +59,6 @@ class Potential {
 
   /// K += d²E/dx² [N/m].
   virtual void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const = 0;
-
-  /// df += scale * (d²E/dx²) dx, without a matrix.
-  virtual void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale,
-                           Forces df) const = 0;
-
-  /// bounds[i] += sum_e K_e |dC/dp_i| sum_j |dC/dp_j|: the Gershgorin row sums of the taut Gauss-Newton stiffness
-  /// [N/m]. The largest bounds[i] / m_i is never below the largest eigenvalue of M^-1 K.
-  virtual void add_bounds(const Positions& x, std::span<Real> bounds) const = 0;
 
   /// D += the damping matrix [N s/m] along the constraint gradients, (time * K) dC dCᵀ: `time` [s] is the ratio of
   /// damping to stiffness, to which elements with a damping time of their own add it. The force is F = -D v.

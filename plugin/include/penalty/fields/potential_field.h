@@ -134,15 +134,13 @@ class PotentialField {
   ElementBatch& batch(std::string_view name);
   const ElementBatch& batch(std::string_view name) const { return const_cast<PotentialField*>(this)->batch(name); }
 
-  // Sums over the potentials that act; as in Potential. Taut stiffness and bounds are those of the stiff phases: what
-  // the stable step is judged by must hold in both.
+  // Sums over the potentials that act; as in Potential. Taut stiffness is that of the stiff phases: what the stable step
+  // is judged by must hold in both.
   std::size_t num_elements() const;
   Real energy(const Positions& x) const;
   Real add_forces(const Positions& x, Forces f) const;
   void add_forces_only(const Positions& x, Forces f) const;
   void add_stiffness(const Positions& x, StiffnessModel model, System& stiffness) const;
-  void add_product(const Positions& x, StiffnessModel model, const Vectors& dx, Real scale, Forces df) const;
-  void add_bounds(const Positions& x, std::span<Real> bounds) const;
   void add_damping(const Positions& x, Real time, System& damping) const;
   void dissipate(const Positions& x, std::span<const Real> inverse_masses, Real time, Real duration, Forces v) const;
   bool damps() const;

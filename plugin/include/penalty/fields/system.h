@@ -86,6 +86,11 @@ class System {
   /// y += scale * A x, one column a particle.
   void add_product(const Vectors& x, Real scale, Forces y) const;
 
+  /// bounds[i] += sum_j |A_ij|, the Gershgorin row sums of the blocks, of rank-one terms |c| |d_i| sum_j |d_j|: no
+  /// eigenvalue of M^-1 A is above the largest bounds[i] / m_i. Terms of negative coefficient, which only lower
+  /// eigenvalues, are left out.
+  void add_bounds(std::span<Real> bounds) const;
+
   /// d += scale * the diagonal of A.
   void add_diagonal(Real scale, Forces d) const;
 
