@@ -5,7 +5,8 @@
 set -euo pipefail
 say() { echo "install.sh: $*"; }
 
-build=(g++ cmake ninja-build pkg-config libbullet-dev libeigen3-dev libgtest-dev)  # a plain configure includes the tests
+build=(g++ cmake ninja-build pkg-config libbullet-dev libeigen3-dev libpugixml-dev zlib1g-dev
+       libgtest-dev)  # a plain configure includes the tests
 demos=(libassimp-dev libcli11-dev nlohmann-json3-dev libpng-dev libstb-dev libgl-dev libegl1 libgl1-mesa-dri fonts-dejavu-core
        ffmpeg glmark2-data)
 tests=(libbenchmark-dev parallel clang-format-19)

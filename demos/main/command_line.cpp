@@ -78,7 +78,7 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_option("--integrator", integrator, "auto, explicit or implicit")->type_name("NAME");
   run->add_option(
          "--mesh", scene.mesh,
-         "Tetrahedra (.vtk, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
+         "Tetrahedra (.vtk, .vtu, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
       ->type_name("FILE");
   run->add_flag("--no-scale", no_scale, "Keep the size of the mesh, else 2 m along its longest side");
   run->add_option("--cells", cells, "Cells along the longest side, where the scene makes the mesh")->type_name("N");

@@ -1,12 +1,21 @@
 #include "fuzz/readers.h"
 #include "mesh/surface_files.h"
+#include "mesh/vtk_xml_files.h"
 
 namespace penalty::testing {
 
 std::vector<std::string> sample_files(FileFormat format) {
   switch (format) {
     case FileFormat::vtk:
-      return {vtk_ascii, vtk_ascii + vtk_data, vtk_offsets, vtk_binary(), vtk_binary_offsets()};
+      return {vtk_ascii,
+              vtk_ascii + vtk_data,
+              vtk_offsets,
+              vtk_binary(),
+              vtk_binary_offsets(),
+              vtk_xml(),
+              vtk_xml({.format = "binary", .long_headers = true}),
+              vtk_xml({.format = "appended", .compressed = true}),
+              vtk_xml({.format = "appended", .raw = true, .compressed = true, .big_endian = true})};
     case FileFormat::gmsh:
       return {gmsh_2,
               gmsh_41,

@@ -13,7 +13,7 @@ namespace {
 class ReadMesh : public MeshFiles {};
 
 TEST_F(ReadMesh, KnowsItsFilesByName) {
-  for (const char* name : {"a.vtk", "b/a.VTK", "a.msh", "a.node", "a.ele"})
+  for (const char* name : {"a.vtk", "b/a.VTK", "a.vtu", "a.msh", "a.node", "a.ele"})
     EXPECT_TRUE(is_tetrahedral_mesh_file(name)) << name;
   for (const char* name : {"a.obj", "a.stl", "a.ply", "a", "", ".vtk.", "vtk"})
     EXPECT_FALSE(is_tetrahedral_mesh_file(name)) << name;
@@ -30,10 +30,13 @@ TEST_F(ReadMesh, NamesWhatIsNoMeshFile) {
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "none"); }), "none: no such file");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "folder.vtk"); }), "folder.vtk: is a directory, not a mesh file");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "empty.vtk"); }), "empty.vtk: the file is empty");
+  write("pointer.msh", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
+  EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "pointer.msh"); }),
+            "pointer.msh: a pointer of Git LFS, not the file: `git lfs pull` fetches that");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "empty.msh"); }), "empty.msh: the file is empty");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "empty.node"); }), "empty.node: the file is empty");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "some.xyz"); }),
-            "some.xyz: the extension '.xyz' is none of .vtk, .msh, .node, .ele");
+            "some.xyz: the extension '.xyz' is none of .vtk, .vtu, .msh, .node, .ele");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder()); }),
             folder().filename().string() + ": is a directory, not a mesh file");
   std::filesystem::create_symlink("/dev/zero", folder() / "endless.vtk");

@@ -28,8 +28,8 @@ std::string in_quotes(std::string_view text);
 /// too; a comment runs from `comment` to the end of its line. Where there are comments, commas are white space. Everything that is missing or malformed throws MeshError with file and line.
 class TextCursor {
  public:
-  TextCursor(std::string file, std::string_view text, char comment = '\0')
-      : file_(std::move(file)), text_(text), comment_(comment) {}
+  TextCursor(std::string file, std::string_view text, char comment = '\0', int line = 1)
+      : file_(std::move(file)), text_(text), comment_(comment), at_line_(line), line_(line) {}
 
   const std::string& file() const { return file_; }
   int line() const { return line_; }  // of the word or line read last
@@ -67,8 +67,8 @@ class TextCursor {
   std::string_view kind_;
   std::int64_t number_ = 0;
   std::size_t at_ = 0;
-  int at_line_ = 1;  // of at_
-  int line_ = 1;
+  int at_line_;  // of at_
+  int line_;
 };
 
 }  // namespace penalty

@@ -65,6 +65,7 @@ class RawMesh {
 };
 
 TetMesh read_vtk(const std::filesystem::path& path);
+TetMesh read_vtk_xml(const std::string& file, std::string_view contents);
 TetMesh read_gmsh(const std::filesystem::path& path);
 TetMesh read_tetgen(const std::filesystem::path& node_path, const std::filesystem::path& ele_path,
                     const std::filesystem::path& source);

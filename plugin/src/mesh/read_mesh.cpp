@@ -24,13 +24,13 @@ std::filesystem::path partner(const std::filesystem::path& path, const char* low
 
 bool is_tetrahedral_mesh_file(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  return extension == ".vtk" || extension == ".msh" || extension == ".node" || extension == ".ele" ||
-         is_tetgen_stem(path);
+  return extension == ".vtk" || extension == ".vtu" || extension == ".msh" || extension == ".node" ||
+         extension == ".ele" || is_tetgen_stem(path);
 }
 
 TetMesh read_mesh(const std::filesystem::path& path) {
   const std::string extension = lower_extension(path);
-  if (extension == ".vtk") return read_vtk(path);
+  if (extension == ".vtk" || extension == ".vtu") return read_vtk(path);
   if (extension == ".msh") return read_gmsh(path);
   if (extension == ".node") return read_tetgen(path, partner(path, ".ele", ".ELE"), path);
   if (extension == ".ele") return read_tetgen(partner(path, ".node", ".NODE"), path, path);
@@ -39,7 +39,7 @@ TetMesh read_mesh(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path, error)) throw MeshError(path.string() + ": no such file");
   if (std::filesystem::is_directory(path, error)) throw MeshError(path.string() + ": is a directory, not a mesh file");
   throw MeshError(path.string() + ": the extension " + in_quotes(path.extension().string()) +
-                  " is none of .vtk, .msh, .node, .ele");
+                  " is none of .vtk, .vtu, .msh, .node, .ele");
 }
 
 }  // namespace penalty

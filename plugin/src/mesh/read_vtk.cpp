@@ -1,34 +1,33 @@
 // VTK legacy files with an UNSTRUCTURED_GRID, ASCII or BINARY (big-endian).
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <charconv>
 #include <optional>
-#include <type_traits>
 
 #include "raw_mesh.h"
 #include "vtk_cells.h"
+#include "vtk_numbers.h"
 
 namespace penalty {
 namespace {
 
-// The bytes of a number in a data section; 0 for a type that VTK does not know.
-std::size_t size_of(std::string_view type) {
-  const std::string name = lower_case(type);
-  if (name == "char" || name == "unsigned_char" || name == "signed_char") return 1;
-  if (name == "short" || name == "unsigned_short") return 2;
-  if (name == "int" || name == "unsigned_int" || name == "float") return 4;
-  if (name == "long" || name == "unsigned_long" || name == "double" || name == "vtktypeint64" || name == "vtkidtype")
-    return 8;
-  return 0;
+std::optional<NumberType> legacy_number_type(std::string_view name) {
+  using Sort = NumberType::Sort;
+  const std::string lower = lower_case(name);
+  if (lower == "float") return NumberType{Sort::floating, 4};
+  if (lower == "double") return NumberType{Sort::floating, 8};
+  const Sort sort = lower.starts_with("unsigned_") ? Sort::natural : Sort::whole;
+  const std::string_view width = std::string_view(lower).substr(sort == Sort::natural ? 9 : 0);
+  if (width == "char" || lower == "signed_char") return NumberType{sort, 1};
+  if (width == "short") return NumberType{sort, 2};
+  if (width == "int") return NumberType{sort, 4};
+  if (width == "long" || lower == "vtktypeint64" || lower == "vtkidtype") return NumberType{sort, 8};
+  return std::nullopt;
 }
 
-template <class T>
-T big_endian(const char* bytes) {
-  std::array<char, sizeof(T)> raw;
-  for (std::size_t k = 0; k < sizeof(T); ++k)
-    raw[k] = bytes[std::endian::native == std::endian::little ? sizeof(T) - 1 - k : k];
-  return std::bit_cast<T>(raw);
+// The bytes of a number in a data section; 0 for a type that VTK does not know.
+std::size_t size_of(std::string_view name) {
+  const std::optional<NumberType> type = legacy_number_type(name);
+  return type ? type->size : 0;
 }
 
 class VtkReader {
@@ -70,8 +69,6 @@ class VtkReader {
 
   void read_header() {
     std::string magic = lower_case(text_.rest_of_line());
-    if (magic.starts_with('<'))
-      text_.fail("VTK's XML is not read: save it as legacy VTK, as ParaView and `meshio convert` do");
     std::erase(magic, ' ');
     if (!magic.starts_with("#vtkdatafileversion"))
       text_.fail("not a legacy VTK file: it does not begin with '# vtk DataFile Version'");
@@ -98,8 +95,8 @@ class VtkReader {
     if (binary_) {
       const std::string_view bytes = raw(count, size, what);
       for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
-        numbers.push_back(size == 8 ? big_endian<std::int64_t>(bytes.data() + 8 * i)
-                                    : std::int64_t{big_endian<std::int32_t>(bytes.data() + 4 * i)});
+        numbers.push_back(
+            number_at<std::int64_t>(bytes.data() + i * size, {NumberType::Sort::whole, size}, std::endian::big));
     } else {
       for (std::int64_t i = 0; i < count; ++i) numbers.push_back(text_.integer(what));
     }
@@ -108,17 +105,15 @@ class VtkReader {
 
   void read_points() {
     const std::int64_t count = text_.count("the number of points", binary_ ? 12 : 6);
-    const std::string_view type = text_.word("the type of the coordinates");
-    const bool is_float = lower_case(type) == "float";
-    if (size_of(type) == 0 || (binary_ && !is_float && lower_case(type) != "double"))
-      text_.fail("coordinates of type " + in_quotes(type) + " are not read: float and double are");
+    const std::string_view name = text_.word("the type of the coordinates");
+    const std::optional<NumberType> type = legacy_number_type(name);
+    if (!type || (binary_ && type->sort != NumberType::Sort::floating))
+      text_.fail("coordinates of type " + in_quotes(name) + " are not read: float and double are");
     mesh_.coordinates.reserve(3 * static_cast<std::size_t>(count));
     if (binary_) {
-      const std::size_t size = is_float ? 4 : 8;
-      const std::string_view bytes = raw(3 * count, size, "the coordinates");
+      const std::string_view bytes = raw(3 * count, type->size, "the coordinates");
       for (std::size_t i = 0; i < 3 * static_cast<std::size_t>(count); ++i)
-        mesh_.coordinates.push_back(is_float ? Real{big_endian<float>(bytes.data() + 4 * i)}
-                                             : big_endian<double>(bytes.data() + 8 * i));
+        mesh_.coordinates.push_back(number_at<Real>(bytes.data() + i * type->size, *type, std::endian::big));
     } else {
       for (std::int64_t i = 0; i < count; ++i) {
         text_.within("vertex", i);
@@ -284,11 +279,13 @@ class VtkReader {
   std::optional<VtkArray> read_array(const std::string& name, std::int64_t components, std::int64_t tuples,
                                      const std::string& type) {
     const std::string kind = lower_case(type);
-    const std::size_t size = kind == "vtkidtype" ? 4 : size_of(kind);  // ids are written as int
-    if (size == 0 && (binary_ || (kind != "bit" && kind != "string"))) return std::nullopt;
+    std::optional<NumberType> numbers = legacy_number_type(kind);
+    if (numbers && kind == "vtkidtype") numbers->size = 4;  // ids are written as int
+    if (!numbers && (binary_ || (kind != "bit" && kind != "string"))) return std::nullopt;
     if (components > 0 && tuples > static_cast<std::int64_t>(text_.remaining()) / components)
       text_.fail("the file ends within the array " + in_quotes(name));
-    VtkArray array{.name = decoded(name), .is_integer = kind != "float" && kind != "double", .values = {}};
+    const bool is_integer = !numbers || numbers->sort != NumberType::Sort::floating;
+    VtkArray array{.name = decoded(name), .is_integer = is_integer, .values = {}};
     const std::int64_t count = components * tuples;
     const bool is_kept = components == 1 && kind != "string";
     if (!binary_) {
@@ -299,25 +296,10 @@ class VtkReader {
           text_.word("a value");
       return array;
     }
-    const std::string_view bytes = raw(count, size, "an array");
-    for (std::int64_t k = 0; is_kept && k < count; ++k)
-      array.values.push_back(number(bytes.data() + static_cast<std::size_t>(k) * size, kind, size));
+    const std::string_view bytes = raw(count, numbers->size, "an array");
+    for (std::size_t k = 0; is_kept && k < static_cast<std::size_t>(count); ++k)
+      array.values.push_back(number_at<double>(bytes.data() + k * numbers->size, *numbers, std::endian::big));
     return array;
-  }
-
-  static double number(const char* bytes, const std::string& kind, std::size_t size) {
-    if (kind == "float") return big_endian<float>(bytes);
-    if (kind == "double") return big_endian<double>(bytes);
-    const auto value = [&](auto of_unsigned) -> double {
-      using Unsigned = decltype(of_unsigned);
-      const auto bits = big_endian<Unsigned>(bytes);
-      if (kind.starts_with("unsigned")) return static_cast<double>(bits);
-      return static_cast<double>(static_cast<std::make_signed_t<Unsigned>>(bits));
-    };
-    if (size == 1) return value(std::uint8_t{});
-    if (size == 2) return value(std::uint16_t{});
-    if (size == 4) return value(std::uint32_t{});
-    return value(std::uint64_t{});
   }
 
   // Names have %20 for a space.
@@ -352,6 +334,8 @@ class VtkReader {
 
 TetMesh read_vtk(const std::filesystem::path& path) {
   const std::string contents = load_file(path);
+  if (contents[std::min(contents.find_first_not_of(" \t\r\n"), contents.size() - 1)] == '<')
+    return read_vtk_xml(path.string(), contents);
   return VtkReader(path.string(), contents).read();
 }
 
