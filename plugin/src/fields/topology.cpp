@@ -122,12 +122,12 @@ std::vector<Real> face_volume_shares(std::span<const Triangle> faces, std::span<
 }
 
 std::vector<Hinge> hinges_of(std::span<const Triangle> triangles) {
-  struct Side {
+  struct HalfEdge {
     Edge edge;
     bool upwards;  // the triangle runs from the lower index to the higher
     int wing;
   };
-  std::vector<Side> sides;
+  std::vector<HalfEdge> sides;
   sides.reserve(3 * triangles.size());
   for (const Triangle& t : triangles)
     for (int k = 0; k < 3; ++k) {
@@ -135,7 +135,7 @@ std::vector<Hinge> hinges_of(std::span<const Triangle> triangles) {
       sides.push_back({sorted_edge(a, b), a < b, t[(k + 2) % 3]});
     }
   // The left triangle, which runs upwards, first; equal ones stay in the order of their triangles.
-  std::stable_sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
+  std::stable_sort(sides.begin(), sides.end(), [](const HalfEdge& l, const HalfEdge& r) {
     return l.edge != r.edge ? l.edge < r.edge : l.upwards && !r.upwards;
   });
   std::vector<Hinge> hinges;
