@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -58,14 +59,16 @@ void check_groups(const std::vector<MeshGroup>& groups, std::size_t size) {
   }
 }
 
-void check_closed_outward(const TriangleSurface& surface) {
+// Whether the surface is closed; if it is, it must be outward, and say so.
+bool check_sides(const TriangleSurface& surface) {
   std::map<std::pair<int, int>, int> directed;
   for (const Triangle& t : surface.triangles)
     for (int k = 0; k < 3; ++k) ++directed[{t[k], t[(k + 1) % 3]}];
-  for (const auto& [edge, count] : directed) {
-    require(count == 1, "two triangles run the same way along an edge");
-    require(directed.contains({edge.second, edge.first}), "the surface is open");
-  }
+  const bool is_closed = std::all_of(directed.begin(), directed.end(), [&](const auto& use) {
+    return use.second == 1 && directed.contains({use.first.second, use.first.first});
+  });
+  require(topology_of(surface).is_closed() == is_closed, "a surface is not as closed as it says");
+  if (!is_closed) return false;
   const Real size = (surface.vertices.rowwise().maxCoeff() - surface.vertices.rowwise().minCoeff()).maxCoeff();
   require(size > 0, "the surface is a point");
   Real volume = 0, magnitude = 0;
@@ -75,7 +78,8 @@ void check_closed_outward(const TriangleSurface& surface) {
     volume += corners.determinant();
     magnitude += std::abs(corners.determinant());
   }
-  require(volume > -1e-12 * magnitude, "the surface is inside-out");
+  require(volume >= -1e-12 * magnitude, "the surface is inside-out");
+  return true;
 }
 
 /// `stem` is the path of the file, or of both of a pair, without extension.
@@ -140,18 +144,19 @@ void ReaderCheck::read_tetrahedra(std::string_view bytes) const {
   require(back.tetrahedra == mesh.tetrahedra, "written and read again, a tetrahedron has changed");
 }
 
-void ReaderCheck::read_triangles(std::string_view bytes) const {
+bool ReaderCheck::read_triangles(std::string_view bytes) const {
   const TriangleSurface surface = read_surface(write("a." + name_of(format_), bytes));
   require(!surface.triangles.empty(), "a surface without triangles");
   check_points(surface.vertices, bytes.size());
   check_indices(surface.triangles, surface.vertices.cols());
-  check_closed_outward(surface);
+  return check_sides(surface);
 }
 
 bool ReaderCheck::read(std::string_view bytes) const {
   const bool solid = format_ == FileFormat::vtk || format_ == FileFormat::gmsh || format_ == FileFormat::tetgen;
   try {
-    solid ? read_tetrahedra(bytes) : read_triangles(bytes);
+    if (!solid) return read_triangles(bytes);
+    read_tetrahedra(bytes);
     return true;
   } catch (const MeshError& error) {
     check_complaint(error.what(), (folder_ / "a").string());

@@ -29,15 +29,15 @@ class ReaderCheck {
   ReaderCheck(const ReaderCheck&) = delete;
   ReaderCheck& operator=(const ReaderCheck&) = delete;
 
-  /// True if the bytes are a mesh, false if the reader refused them. Throws Finding if the mesh is not what the header
-  /// promises (finite vertices, indices in range, tetrahedra positively oriented or the surface closed and outward, no
-  /// more elements than the bytes can hold, the same mesh again when it is written and read), if the complaint is not
+  /// True if the bytes are a mesh or a closed surface, false if the reader refused them or the surface is open. Throws
+  /// Finding if it is not what the header promises (finite vertices, indices in range, tetrahedra positively oriented, a
+  /// closed surface outward, no more elements than the bytes can hold, the same mesh again when it is written and read), if the complaint is not
   /// one short printable line that begins with the name of the file, and if anything but MeshError is thrown.
   bool read(std::string_view bytes) const;
 
  private:
   void read_tetrahedra(std::string_view bytes) const;
-  void read_triangles(std::string_view bytes) const;
+  bool read_triangles(std::string_view bytes) const;
   std::filesystem::path write(const std::string& name, std::string_view bytes) const;
 
   FileFormat format_;

@@ -11,6 +11,7 @@
 #include "files.h"
 #include "overlap.h"
 #include "surfaces.h"
+#include "winding_number.h"
 
 namespace penalty::testing {
 namespace {
@@ -138,20 +139,92 @@ TEST(Embed, NumbersLatticeSliceBySliceAlongTheLongestSide) {
   EXPECT_LT(widest, static_cast<int>(e.lattice.vertices.cols()) / 8);
 }
 
+TEST(Embed, CountsThePiecesOfTheLattice) {
+  const TriangleSurface ball = boundary_surface(make_ball(1, 2));
+  TriangleSurface far = ball;
+  far.vertices.row(0).array() += 5;
+  const EmbeddedSurface apart = embed(together(ball, far));
+  EXPECT_EQ(apart.pieces, 2);
+  EXPECT_EQ(2 * reached_through_faces(apart.lattice), apart.lattice.tetrahedra.size()) << "of two alike";
+  far.vertices.row(0).array() -= 2.9;
+  EXPECT_EQ(embed(together(ball, far), {.cells = 4}).pieces, 1) << "cells that reach from one to the other join them";
+}
+
+bool holds(const TetMesh& mesh, const Vector3& point) {
+  return std::any_of(mesh.tetrahedra.begin(), mesh.tetrahedra.end(), [&](const Tetrahedron& t) {
+    Eigen::Matrix4d corners;
+    for (int k = 0; k < 4; ++k) corners.col(k) << mesh.vertices.col(t[k]), 1;
+    return (corners.inverse() * Eigen::Vector4d(point[0], point[1], point[2], 1)).minCoeff() >= 0;
+  });
+}
+
+// The tetrahedra that `whole` has, and no others.
+void expect_same_lattice(const EmbeddedSurface& e, const EmbeddedSurface& whole) {
+  EXPECT_EQ(e.lattice.vertices, whole.lattice.vertices);
+  EXPECT_EQ(e.lattice.tetrahedra, whole.lattice.tetrahedra);
+}
+
+TEST(Embed, FillsSurfacesWithHolesDoubledFacesAndTrianglesThatFaceTheOtherSide) {
+  const TriangleSurface ball = boundary_surface(make_ball(1, 8));
+  const EmbeddedSurface whole = embed(ball, {.cells = 12});
+  TriangleSurface worn = ball;
+  for (std::size_t k = 0; k < ball.triangles.size(); k += 50) {
+    const Triangle t = ball.triangles[k];
+    worn.triangles.push_back({t[0], t[2], t[1]});
+    std::swap(worn.triangles[k + 1][0], worn.triangles[k + 1][1]);
+  }
+  expect_same_lattice(embed(worn, {.cells = 12}), whole);
+  // Holes of one triangle in thirty, each smaller than a cell; then a cap is gone, 0.87 in radius.
+  TriangleSurface pierced = worn;
+  std::size_t count = 0;
+  std::erase_if(pierced.triangles, [&](const Triangle&) { return count++ % 30 == 0; });
+  ASSERT_FALSE(topology_of(pierced).is_closed());
+  const EmbeddedSurface filled = embed(pierced, {.cells = 12});
+  EXPECT_NEAR(volume(filled.lattice), volume(whole.lattice), 0.02 * volume(whole.lattice));
+  TriangleSurface cut = ball;
+  std::erase_if(cut.triangles, [&](const Triangle& t) { return ball.vertices(1, t[0]) > 0.5; });
+  const EmbeddedSurface bowl = embed(cut, {.cells = 12});
+  EXPECT_EQ(bowl.pieces, 1);
+  EXPECT_TRUE(holds(bowl.lattice, {0.01, 0, 0.02}));
+  EXPECT_TRUE(holds(bowl.lattice, {0.51, 0.2, -0.33}));
+  EXPECT_FALSE(holds(bowl.lattice, {0.01, 0.95, 0.02})) << "above the opening";
+}
+
+TEST(Embed, FillsCubesThatShareAWall) {
+  const TriangleSurface cube = boundary_surface(make_box({1, 1, 1}, {2, 2, 2}));
+  TriangleSurface next = cube;
+  next.vertices.row(0).array() += 1;
+  const EmbeddedSurface both = embed(together(cube, next), {.cells = 8});
+  EXPECT_GT(topology_of(both.surface).branching_edges, 0);
+  expect_same_lattice(both, embed(boundary_surface(make_box({2, 1, 1}, {4, 2, 2})), {.cells = 8}));
+}
+
+TEST(WindingNumber, IsOneInsideZeroOutsideAndThatOfTheSolidAngleInBetween) {
+  constexpr unsigned seed = 11;
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<Real> place(-2, 2);
+  const TriangleSurface ball = boundary_surface(make_ball(1, 12));
+  const WindingNumber winding(ball);
+  TriangleSurface half = ball;  // open, below y = 0
+  std::erase_if(half.triangles, [&](const Triangle& t) {
+    return ball.vertices(1, t[0]) + ball.vertices(1, t[1]) + ball.vertices(1, t[2]) > 0;
+  });
+  const WindingNumber of_half(half);
+  for (int k = 0; k < 2000; ++k) {
+    const Vector3 p(place(random), place(random), place(random));
+    if (std::abs(p.norm() - 1) < 0.03) continue;
+    EXPECT_NEAR(winding.at(p), p.norm() < 1 ? 1 : 0, 0.02) << p.transpose() << ", seed " << seed;
+  }
+  EXPECT_NEAR(of_half.at({0, 0, 0}), 0.5, 0.02) << "a hemisphere, from its centre";
+  // From above on the axis: the cone through the rim, (1 - cos) / 2 of all directions, seen from inside out.
+  for (const Real y : {0.5, 1.0, 3.0})
+    EXPECT_NEAR(of_half.at({0, y, 0}), (1 - y / std::sqrt(1 + y * y)) / 2, 0.02) << y;
+}
+
 TEST(Embed, NamesWhatItRefuses) {
   const TriangleSurface ball = boundary_surface(make_ball(1, 2));
   EXPECT_EQ(invalid_argument([&] { embed(ball, {.cells = 0}); }), "embed: cells is 0, not between 1 and 200");
   EXPECT_EQ(invalid_argument([&] { embed(ball, {.cells = 201}); }), "embed: cells is 201, not between 1 and 200");
-  TriangleSurface open = ball;
-  open.triangles.pop_back();
-  EXPECT_NE(invalid_argument([&] { embed(open); }).find("the surface is open"), std::string::npos);
-  TriangleSurface far = ball;
-  far.vertices.row(0).array() += 5;
-  EXPECT_EQ(invalid_argument([&] { embed(together(ball, far)); }),
-            "two surfaces: the surface is in 2 pieces that do not touch at 20 cells: embed them one by one");
-  far.vertices.row(0).array() -= 2.9;
-  EXPECT_EQ(embed(together(ball, far), {.cells = 4}).surface.triangles.size(), 2 * ball.triangles.size())
-      << "cells that reach from one to the other join them";
   const EmbeddedSurface e = embed(ball, {.cells = 2});
   EXPECT_EQ(invalid_argument([&] { skin(e, Eigen::Matrix3Xd::Zero(3, 2)); }),
             "skin: 2 lattice positions for " + std::to_string(e.lattice.vertices.cols()) + " lattice vertices");

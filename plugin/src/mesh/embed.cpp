@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "bcc_lattice.h"
 #include "overlap.h"
+#include "winding_number.h"
 
 namespace penalty {
 namespace {
@@ -18,21 +18,6 @@ Points<3> corners(const TriangleSurface& surface, const Triangle& triangle) {
   Points<3> points;
   for (int k = 0; k < 3; ++k) points.col(k) = surface.vertices.col(triangle[k]);
   return points;
-}
-
-// How often the surface goes round `point`: 1 inside, 0 outside (the sum of the solid angles over 4 pi; Van Oosterom
-// and Strackee, IEEE Trans. Biomed. Eng. 30, 1983).
-Real winding_number(const TriangleSurface& surface, const Vector3& point) {
-  Real sum = 0;
-  for (const Triangle& triangle : surface.triangles) {
-    const Points<3> p = corners(surface, triangle).colwise() - point;
-    const Real a = p.col(0).norm(), b = p.col(1).norm(), c = p.col(2).norm();
-    const Real numerator = p.col(0).dot(p.col(1).cross(p.col(2)));
-    const Real denominator =
-        a * b * c + p.col(0).dot(p.col(1)) * c + p.col(1).dot(p.col(2)) * a + p.col(2).dot(p.col(0)) * b;
-    sum += std::atan2(numerator, denominator);
-  }
-  return sum / (2 * std::numbers::pi);
 }
 
 // Tetrahedra that the surface touches. `holding` is the tetrahedron of each surface vertex.
@@ -77,19 +62,24 @@ std::vector<Id> flood(const BccLattice& lattice, Id start, Place place, std::vec
   return reached;
 }
 
-// What the surface does not touch lies on one side of it, region by region.
+// What a closed surface does not touch lies on one side of it, region by region. Through holes a region may reach in.
 void mark_regions(const TriangleSurface& surface, const BccLattice& lattice, std::vector<Place>& places) {
+  const bool is_closed = topology_of(surface).is_closed();
+  const WindingNumber winding(surface);
   for (Id id = 0; id < lattice.num_tetrahedra(); ++id) {
     if (places[id] != Place::unknown) continue;
     const Vector3 middle = lattice.points_of(id).rowwise().mean();
-    flood(lattice, id, std::abs(winding_number(surface, middle)) > 0.5 ? Place::inside : Place::outside, places);
+    const Place place = std::abs(winding.at(middle)) > 0.5 ? Place::inside : Place::outside;
+    if (is_closed)
+      flood(lattice, id, place, places);
+    else
+      places[id] = place;
   }
 }
 
-void require_one_piece(const TriangleSurface& surface, const BccLattice& lattice, const std::vector<Place>& places,
-                       int cells) {
+int count_lattice_pieces(const BccLattice& lattice, const std::vector<Place>& places) {
   std::vector<Place> kept(places.size(), Place::outside);
-  std::size_t pieces = 0;
+  int pieces = 0;
   for (std::size_t i = 0; i < places.size(); ++i)
     if (places[i] == Place::inside || places[i] == Place::surface) kept[i] = Place::inside;
   for (Id id = 0; id < lattice.num_tetrahedra(); ++id)
@@ -97,10 +87,7 @@ void require_one_piece(const TriangleSurface& surface, const BccLattice& lattice
       flood(lattice, id, Place::outside, kept);
       ++pieces;
     }
-  if (pieces != 1)
-    throw std::invalid_argument((surface.source.empty() ? "embed" : surface.source) + ": the surface is in " +
-                                std::to_string(pieces) + " pieces that do not touch at " + std::to_string(cells) +
-                                " cells: embed them one by one");
+  return pieces;
 }
 
 Eigen::Vector4d barycentric(const Points<4>& p, const Vector3& point) {
@@ -134,7 +121,8 @@ EmbeddedSurface embed(const TriangleSurface& surface, const EmbeddingOptions& op
   }
   mark_surface(skin, lattice, holding, places);
   mark_regions(skin, lattice, places);
-  require_one_piece(skin, lattice, places, options.cells);
+  embedded.pieces = count_lattice_pieces(lattice, places);
+  embedded.num_inside = static_cast<int>(std::count(places.begin(), places.end(), Place::inside));
 
   std::vector<int> new_index(static_cast<std::size_t>(lattice.num_vertices()), -1);
   TetMesh& mesh = embedded.lattice;

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 
 #include "mesh_text.h"
 #include "penalty/mesh/tet_mesh.h"
 #include "point_grid.h"
+#include "surface_pieces.h"
 
 namespace penalty {
 namespace {
@@ -76,6 +79,15 @@ void drop_unused_vertices(TriangleSurface& surface) {
     for (int& v : t) v = new_index[v];
 }
 
+void drop_doubled_triangles(TriangleSurface& surface) {
+  std::set<Triangle> known;
+  const auto doubled = std::erase_if(surface.triangles, [&known](Triangle t) {
+    std::sort(t.begin(), t.end());
+    return !known.insert(t).second;
+  });
+  surface.repairs.doubled_triangles = static_cast<int>(doubled);
+}
+
 // A use of an edge by a triangle, `forward` if it runs from the lower vertex to the higher.
 struct EdgeUse {
   Edge edge;
@@ -83,7 +95,7 @@ struct EdgeUse {
   bool forward;
 };
 
-void check_closed(const TriangleSurface& surface) {
+std::vector<EdgeUse> sorted_edge_uses(const TriangleSurface& surface) {
   std::vector<EdgeUse> uses;
   uses.reserve(3 * surface.triangles.size());
   for (std::size_t i = 0; i < surface.triangles.size(); ++i)
@@ -94,27 +106,107 @@ void check_closed(const TriangleSurface& surface) {
   std::sort(uses.begin(), uses.end(), [](const EdgeUse& l, const EdgeUse& r) {
     return std::tie(l.edge, l.triangle) < std::tie(r.edge, r.triangle);
   });
+  return uses;
+}
+
+// Calls visit(uses of one edge), edge by edge.
+template <class Visit>
+void for_each_edge(const TriangleSurface& surface, const Visit& visit) {
+  const std::vector<EdgeUse> uses = sorted_edge_uses(surface);
   for (std::size_t i = 0; i < uses.size();) {
     std::size_t end = i;
     while (end < uses.size() && uses[end].edge == uses[i].edge) ++end;
-    const std::size_t count = end - i;
+    visit(std::span(uses).subspan(i, end - i));
+    i = end;
+  }
+}
+
+// Across edges of two triangles each, starting from the first triangle of each such patch.
+void unite_windings(TriangleSurface& surface) {
+  struct Neighbour {
+    int triangle;
+    bool opposed;  // it faces the other side
+  };
+  std::vector<std::vector<Neighbour>> neighbours(surface.triangles.size());
+  for_each_edge(surface, [&neighbours](std::span<const EdgeUse> uses) {
+    if (uses.size() != 2) return;
+    const bool opposed = uses[0].forward == uses[1].forward;
+    neighbours[uses[0].triangle].push_back({uses[1].triangle, opposed});
+    neighbours[uses[1].triangle].push_back({uses[0].triangle, opposed});
+  });
+  enum class Side : char { unknown, first, other };
+  std::vector<Side> sides(surface.triangles.size(), Side::unknown);
+  for (std::size_t start = 0; start < sides.size(); ++start) {
+    if (sides[start] != Side::unknown) continue;
+    std::vector<int> patch{static_cast<int>(start)};
+    sides[start] = Side::first;
+    for (std::size_t i = 0; i < patch.size(); ++i)
+      for (const Neighbour& next : neighbours[patch[i]])
+        if (sides[next.triangle] == Side::unknown) {
+          sides[next.triangle] = (sides[patch[i]] == Side::first) == next.opposed ? Side::other : Side::first;
+          patch.push_back(next.triangle);
+        }
+    const auto others = std::count_if(patch.begin(), patch.end(), [&](int t) { return sides[t] == Side::other; });
+    const Side fewer = 2 * static_cast<std::size_t>(others) > patch.size() ? Side::first : Side::other;
+    for (const int t : patch)
+      if (sides[t] == fewer) {
+        std::swap(surface.triangles[t][1], surface.triangles[t][2]);
+        ++surface.repairs.turned_triangles;
+      }
+  }
+}
+
+bool encloses_something(const TriangleSurface& surface) {
+  const Vector3 box = surface.vertices.rowwise().maxCoeff() - surface.vertices.rowwise().minCoeff();
+  return std::abs(volume(surface)) > 1e-12 * std::pow(box.maxCoeff(), 3);
+}
+
+}  // namespace
+
+std::string to_text(const SurfaceRepair& repairs) {
+  std::string text;
+  const auto add = [&text](const char* verb, int count, const char* one, const char* many) {
+    if (count > 0)
+      text +=
+          std::string(text.empty() ? "" : ", ") + verb + " " + std::to_string(count) + " " + (count == 1 ? one : many);
+  };
+  add("merged", repairs.merged_vertices, "vertex", "vertices");
+  add("dropped", repairs.dropped_vertices, "vertex of no triangle", "vertices of no triangle");
+  add("dropped", repairs.dropped_triangles, "collapsed triangle", "collapsed triangles");
+  add("dropped", repairs.doubled_triangles, "doubled triangle", "doubled triangles");
+  add("turned", repairs.turned_triangles, "triangle to the side of its neighbours",
+      "triangles to the side of their neighbours");
+  if (repairs.flipped) text += std::string(text.empty() ? "" : ", ") + "turned the surface inside out";
+  return text;
+}
+
+SurfaceTopology topology_of(const TriangleSurface& surface) {
+  SurfaceTopology topology{.pieces = count_pieces(surface)};
+  for_each_edge(surface, [&topology](std::span<const EdgeUse> uses) {
+    topology.open_edges += uses.size() == 1;
+    topology.branching_edges += uses.size() > 2;
+    topology.opposed_edges += uses.size() == 2 && uses[0].forward == uses[1].forward;
+  });
+  return topology;
+}
+
+void check_closed(const TriangleSurface& surface) {
+  for_each_edge(surface, [&surface](std::span<const EdgeUse> uses) {
+    if (uses.size() == 2 && uses[0].forward != uses[1].forward) return;
     const auto corner = [&](int v) {
       std::string place = "vertex (";
       for (int axis = 0; axis < 3; ++axis)
         place.append(axis > 0 ? ", " : "").append(to_text(surface.vertices(axis, v)));
       return place.append(")");
     };
-    const std::string edge = "the edge from " + corner(uses[i].edge[0]) + " to " + corner(uses[i].edge[1]);
-    if (count == 1) fail(surface, "the surface is open: " + edge + " belongs to one triangle only");
-    if (count > 2)
-      fail(surface, "the surface branches: " + edge + " belongs to " + std::to_string(count) + " triangles");
-    if (uses[i].forward == uses[i + 1].forward)
-      fail(surface, "neighbouring triangles face opposite sides: both run through " + edge + " in the same direction");
-    i = end;
-  }
+    const std::string edge = "the edge from " + corner(uses[0].edge[0]) + " to " + corner(uses[0].edge[1]);
+    if (uses.size() == 1) fail(surface, "the surface is open: " + edge + " belongs to one triangle only");
+    if (uses.size() > 2)
+      fail(surface, "the surface branches: " + edge + " belongs to " + std::to_string(uses.size()) + " triangles");
+    fail(surface, "neighbouring triangles face opposite sides: both run through " + edge + " in the same direction");
+  });
+  if (!encloses_something(surface)) fail(surface, "the surface encloses a volume of " + to_text(volume(surface)));
 }
-
-}  // namespace
 
 void repair(TriangleSurface& surface, Real merge_tolerance) {
   if (!(merge_tolerance >= 0) || merge_tolerance >= 1)
@@ -122,13 +214,10 @@ void repair(TriangleSurface& surface, Real merge_tolerance) {
   surface.repairs = {};
   check(surface);
   merge_vertices(surface, merge_tolerance);
+  drop_doubled_triangles(surface);
   drop_unused_vertices(surface);
-  check_closed(surface);
-  const Real enclosed = volume(surface);
-  const Vector3 box = surface.vertices.rowwise().maxCoeff() - surface.vertices.rowwise().minCoeff();
-  if (!(std::abs(enclosed) > 1e-12 * std::pow(box.maxCoeff(), 3)))
-    fail(surface, "the surface encloses a volume of " + to_text(enclosed));
-  if (enclosed < 0) {
+  unite_windings(surface);
+  if (topology_of(surface).is_closed() && volume(surface) < 0) {
     for (Triangle& t : surface.triangles) std::swap(t[1], t[2]);
     surface.repairs.flipped = true;
   }

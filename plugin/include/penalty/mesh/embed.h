@@ -1,4 +1,4 @@
-// A simulation mesh around a closed surface: the lattice moves, the surface follows it.
+// A simulation mesh around a surface: the lattice moves, the surface follows it.
 #pragma once
 #include <vector>
 
@@ -18,14 +18,18 @@ struct EmbeddedSurface {
   TriangleSurface surface;
   std::vector<Tetrahedron> stencils;  // one a surface vertex
   Eigen::Matrix4Xd weights;           // 4 x surface vertices
+  int pieces = 0;                     // of the lattice, joined by faces
+  int num_inside = 0;                 // tetrahedra that the surface does not touch: none of an open sheet
 };
 
 /// Covers `surface`, repaired first, with the tetrahedra of a body-centred cubic lattice that touch it or lie inside:
 /// all of one shape, edges 1 and sqrt(3)/2 cells, dihedral angles 60 and 90 degrees. What counts as inside is decided
-/// by the winding number, so that cavities stay hollow where a cell fits. Lattice vertices and tetrahedra are numbered
-/// slice by slice across the longest side of the box. Parts of the surface that come closer than about a cell grow
-/// together: more cells separate them. Throws std::invalid_argument for a surface that `repair` refuses, for cells out
-/// of range, and for a surface in pieces so far apart that the lattice falls apart too.
+/// by the winding number, so that cavities stay hollow where a cell fits, and any surface will do: with holes, which are
+/// filled as by a membrane, with branching edges, in several pieces, which are one body then (see `pieces_of`). Of an open
+/// sheet nothing is inside, and the lattice is one cell thick: it is better made cloth, `make_soft_body(surface)`. Lattice
+/// vertices and tetrahedra are numbered slice by slice across the longest side of the box. Parts of the surface that come
+/// closer than about a cell grow together: more cells separate them. Throws std::invalid_argument for a surface that
+/// `repair` refuses, for one without extent and for cells out of range.
 EmbeddedSurface embed(const TriangleSurface& surface, const EmbeddingOptions& options = {});
 
 /// The surface vertices where the lattice takes them: column v = sum_k weights(k, v) x(stencils[v][k]).

@@ -1,4 +1,4 @@
-// Reads closed triangle surfaces. Its own library, BulletPenalty::surface: nothing else needs Assimp.
+// Reads triangle surfaces. Its own library, BulletPenalty::surface: nothing else needs Assimp.
 #pragma once
 #include <filesystem>
 
@@ -11,7 +11,8 @@ namespace penalty {
 bool is_surface_file(const std::filesystem::path& path);
 
 /// Reads all faces of an .obj or .stl file (through Assimp, in single precision) or of a .ply file and repairs them;
-/// larger polygons are cut into fans. Throws MeshError with one line, naming the file, for everything that is wrong
+/// larger polygons are cut into fans. Open surfaces are cloth to `make_soft_body`; `check_closed` refuses them where that
+/// matters, and `embed` takes all. Throws MeshError with one line, naming the file, for everything that is wrong
 /// with it.
 TriangleSurface read_surface(const std::filesystem::path& path);
 
