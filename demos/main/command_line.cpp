@@ -76,9 +76,8 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_option("scene", options.scene, "One of the scenes of `penalty-demo list`")->required()->type_name("SCENE");
   run->add_option("--world", world, "Bullet's world: classic or deformable")->type_name("NAME");
   run->add_option("--integrator", integrator, "auto, explicit or implicit")->type_name("NAME");
-  run->add_option(
-         "--mesh", scene.mesh,
-         "Tetrahedra (.vtk, .vtu, .msh, .node/.ele), a closed surface (.obj, .stl, .ply), or bunny, torus, ball, box")
+  run->add_option("--mesh", scene.mesh,
+                  "Tetrahedra (.vtk, .vtu, .msh, .node/.ele), a surface (.obj, .stl, .ply), or bunny, torus, ball, box")
       ->type_name("FILE");
   run->add_flag("--no-scale", no_scale, "Keep the size of the mesh, else 2 m along its longest side");
   run->add_option("--cells", cells, "Cells along the longest side, where the scene makes the mesh")->type_name("N");

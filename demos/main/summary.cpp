@@ -54,9 +54,8 @@ Json mesh_summary(const std::vector<SoftObject>& bodies) {
     edges += body.mesh.edges().size();
   }
   const BodyMesh& first = bodies.front().mesh;
-  return {{"source", first.source()}, {"repairs", first.is_shell() ? "" : to_text(first.solid().repairs)},
-          {"vertices", vertices},     {"tetrahedra", tetrahedra},
-          {"triangles", triangles},   {"edges", edges}};
+  return {{"source", first.source()}, {"repairs", first.repairs()}, {"vertices", vertices},
+          {"tetrahedra", tetrahedra}, {"triangles", triangles},     {"edges", edges}};
 }
 
 /// What each batch holds at the end, and what came and went in the course of the run.

@@ -33,6 +33,8 @@ BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options
   place(surface.vertices, options.scale);
   try {
     EmbeddedSurface lattice = embed(surface, {.cells = cells});
+    lattice.surface.repairs = surface.repairs;  // what was amiss with the file
+    if (lattice.num_inside == 0 && !topology_of(surface).is_closed()) return {std::move(surface)};
     return {lattice.lattice, std::move(lattice)};
   } catch (const std::invalid_argument& error) {
     throw MeshError(error.what());
@@ -56,6 +58,21 @@ std::vector<Edge> BodyMesh::edges() const {
 std::string BodyMesh::source() const {
   if (surface) return surface->surface.source;
   return is_shell() ? shell().source : solid().source;
+}
+
+std::string BodyMesh::repairs() const {
+  if (!surface && !is_shell()) return to_text(solid().repairs);
+  const TriangleSurface& read = surface ? surface->surface : shell();
+  SurfaceRepair repairs = read.repairs;
+  repairs.merged_vertices = 0;  // some formats have no others, and Assimp takes all apart
+  std::string text = to_text(repairs);
+  const auto add = [&text](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+  const SurfaceTopology topology = topology_of(read);
+  if (surface && !topology.is_closed())
+    add(std::to_string(topology.open_edges) + " open and " + std::to_string(topology.branching_edges) +
+        " branching edges: filled by the winding number");
+  if (surface && surface->pieces > 1) add(std::to_string(surface->pieces) + " pieces in one body");
+  return text;
 }
 
 Eigen::VectorXd BodyMesh::vertex_shares() const {

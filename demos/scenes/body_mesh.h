@@ -14,6 +14,9 @@ struct BodyMesh {
   std::variant<TetMesh, TriangleSurface> mesh;  // what is simulated
   std::optional<EmbeddedSurface> surface = {};  // what is drawn and touches, where that is not the boundary of the mesh
 
+  /// What was amiss with the file, and what became of it; one line, empty if nothing was.
+  std::string repairs() const;
+
   bool is_shell() const { return std::holds_alternative<TriangleSurface>(mesh); }
   const TetMesh& solid() const { return std::get<TetMesh>(mesh); }
   const TriangleSurface& shell() const { return std::get<TriangleSurface>(mesh); }
@@ -38,7 +41,7 @@ struct BodyMesh {
 /// The Stanford bunny as Debian's package glmark2-data brings it.
 std::filesystem::path bunny_path();
 
-/// The mesh of `options.mesh`, or of `by_default`, about the origin. Throws MeshError for a file that is no usable mesh
+/// The mesh of `options.mesh`, or of `by_default`, about the origin; of an open sheet a shell. Throws MeshError for a file that is no usable mesh
 /// and std::invalid_argument for an unknown name or an impossible number of cells; both say it in one line.
 BodyMesh load_body(const SceneOptions& options, const std::string& by_default);
 

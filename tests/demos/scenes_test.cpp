@@ -1,7 +1,12 @@
 // Every scene in both worlds, briefly, held to the laws it has to obey. Compiled for both precisions of Bullet.
+#include <unistd.h>
+
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 
 #include "penalty/mesh/builders.h"
+#include "penalty/mesh/surface_builders.h"
 #include "scene_fixture.h"
 
 namespace penalty::demo {
@@ -73,6 +78,43 @@ TEST_P(Scenes, DropCarriesAnEmbeddedSurface) {
   EXPECT_LT(surface.row(1).minCoeff(), 0.2);  // it has landed
   EXPECT_LT(scene->particles().positions.row(1).minCoeff(),
             surface.row(1).minCoeff());  // the lattice reaches beyond it
+}
+
+TEST_P(Scenes, DropMakesClothOfAnOpenSheetAndFillsSurfacesWithHoles) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("penalty-drop-" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  const auto write = [&folder](const char* name, const Eigen::Matrix3Xd& vertices,
+                               const std::vector<Triangle>& triangles) {
+    std::ofstream file(folder / name);
+    for (Eigen::Index v = 0; v < vertices.cols(); ++v) file << "v " << vertices.col(v).transpose() << '\n';
+    for (const Triangle& t : triangles) file << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+    return (folder / name).string();
+  };
+  const TriangleSurface sheet = make_sheet(1, 1, 12, 12);
+  const TetMesh box = make_box({1, 1, 1}, {1, 1, 1});
+  std::vector<Triangle> pierced = boundary_faces(box.tetrahedra);
+  pierced.pop_back();
+  for (const std::string& file :
+       {write("sheet.obj", sheet.vertices, sheet.triangles), write("box.obj", box.vertices, pierced)}) {
+    SCOPED_TRACE(file);
+    const bool is_sheet = file.ends_with("sheet.obj");
+    const auto scene = make("drop", {.mesh = file, .cells = 6});
+    const BodyMesh& body = scene->setup().bodies[0].mesh;
+    EXPECT_EQ(body.is_shell(), is_sheet);
+    EXPECT_EQ(body.repairs(), is_sheet ? "" : "3 open and 0 branching edges: filled by the winding number");
+    Real deepest = 0, lowest = 2;
+    for (int step = 0; step < 96; ++step) {
+      scene->step(dt);
+      deepest = std::max(deepest, scene->penetration());
+      lowest = std::min(lowest, body.drawn(scene->particles().positions.topRows<3>()).row(1).minCoeff());
+    }
+    ASSERT_TRUE(scene->report().finite);
+    EXPECT_LT(deepest, margin);
+    EXPECT_LT(lowest, 0.2) << "it lands";
+    EXPECT_GT(lowest, 0);
+  }
+  std::filesystem::remove_all(folder);
 }
 
 TEST_P(Scenes, BeamHangsFromItsClampedFace) {
