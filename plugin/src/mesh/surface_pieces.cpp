@@ -21,6 +21,7 @@ std::vector<int> roots_of(const TriangleSurface& surface) {
   for (const Triangle& t : surface.triangles)
     for (const int v : {t[1], t[2]}) root[find(v)] = find(t[0]);
   std::vector<int> roots;
+  roots.reserve(surface.triangles.size());
   for (const Triangle& t : surface.triangles) roots.push_back(find(t[0]));
   return roots;
 }
@@ -67,6 +68,7 @@ std::vector<TriangleSurface> pieces_of(const TriangleSurface& surface) {
     shells[place->second].push_back(surface.triangles[i]);
   }
   std::vector<TriangleSurface> parts;
+  parts.reserve(shells.size());
   for (const std::vector<Triangle>& shell : shells) parts.push_back(part_of(surface, shell));
   // Each goes with the outermost one around it.
   std::vector<std::size_t> body(parts.size());
