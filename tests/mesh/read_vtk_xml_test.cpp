@@ -114,7 +114,7 @@ TEST_F(ReadVtkXml, NamesEncodedDataThatIsNotWhatItShouldBe) {
   EXPECT_EQ(complaint(replaced(binary, types + base64("\n\5\n"), types)),
             "a.vtu:31: array 'types': the data ends early or is not encoded as it should be");
   const std::string packed = vtk_xml({.format = "appended", .raw = true, .compressed = true});
-  for (std::size_t k = packed.find("_") + 1; k < packed.rfind("\n</Appended"); k += 3) {
+  for (std::size_t k = packed.find('_') + 1; k < packed.rfind("\n</Appended"); k += 3) {
     std::string broken = packed;
     broken[k] = static_cast<char>(broken[k] ^ 0x55);
     SCOPED_TRACE("byte " + std::to_string(k));
