@@ -13,6 +13,7 @@ namespace {
 
 constexpr Real size = 2;                // of a scaled mesh, along its longest side [m]
 constexpr int lattice_cells = 20;       // of an embedded surface, unless the user says otherwise
+constexpr Real least_enclosure = 0.75;  // of a surface that is taken for a solid
 constexpr Real samples_per_cell = 1.6;  // contact points along the side of a lattice cell
 
 /// Moves the bounding box to the origin and, if `scale`, gives its longest side the standard length.
@@ -32,9 +33,9 @@ BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options
   TriangleSurface surface = read_surface(path);
   place(surface.vertices, options.scale);
   try {
+    if (!topology_of(surface).is_closed() && enclosure(surface) < least_enclosure) return {std::move(surface)};
     EmbeddedSurface lattice = embed(surface, {.cells = cells});
     lattice.surface.repairs = surface.repairs;  // what was amiss with the file
-    if (lattice.num_inside == 0 && !topology_of(surface).is_closed()) return {std::move(surface)};
     return {lattice.lattice, std::move(lattice)};
   } catch (const std::invalid_argument& error) {
     throw MeshError(error.what());

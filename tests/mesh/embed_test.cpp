@@ -10,6 +10,7 @@
 #include "bcc_lattice.h"
 #include "files.h"
 #include "overlap.h"
+#include "penalty/mesh/surface_builders.h"
 #include "surfaces.h"
 #include "winding_number.h"
 
@@ -219,6 +220,23 @@ TEST(WindingNumber, IsOneInsideZeroOutsideAndThatOfTheSolidAngleInBetween) {
   // From above on the axis: the cone through the rim, (1 - cos) / 2 of all directions, seen from inside out.
   for (const Real y : {0.5, 1.0, 3.0})
     EXPECT_NEAR(of_half.at({0, y, 0}), (1 - y / std::sqrt(1 + y * y)) / 2, 0.02) << y;
+}
+
+TEST(Enclosure, TellsSkinsOfSolidsFromSheets) {
+  const TriangleSurface ball = boundary_surface(make_ball(1, 8));
+  EXPECT_NEAR(enclosure(ball), 1, 0.01);
+  EXPECT_NEAR(enclosure(inside_out(ball)), 1, 0.01);
+  EXPECT_NEAR(enclosure(make_sheet(1, 2, 8, 16)), 0.5, 0.01);
+  TriangleSurface pierced = ball;
+  std::size_t count = 0;
+  std::erase_if(pierced.triangles, [&](const Triangle&) { return count++ % 20 == 0; });
+  EXPECT_GT(enclosure(pierced), 0.93);
+  TriangleSurface tube = boundary_surface(make_box({0.01, 1, 0.01}, {1, 40, 1}));  // thin, without its ends
+  std::erase_if(tube.triangles, [&](const Triangle& t) {
+    return tube.vertices(1, t[0]) == tube.vertices(1, t[1]) && tube.vertices(1, t[1]) == tube.vertices(1, t[2]);
+  });
+  EXPECT_FALSE(topology_of(tube).is_closed());
+  EXPECT_GT(enclosure(tube), 0.95);
 }
 
 TEST(Embed, NamesWhatItRefuses) {

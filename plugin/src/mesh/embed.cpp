@@ -122,7 +122,6 @@ EmbeddedSurface embed(const TriangleSurface& surface, const EmbeddingOptions& op
   mark_surface(skin, lattice, holding, places);
   mark_regions(skin, lattice, places);
   embedded.pieces = count_lattice_pieces(lattice, places);
-  embedded.num_inside = static_cast<int>(std::count(places.begin(), places.end(), Place::inside));
 
   std::vector<int> new_index(static_cast<std::size_t>(lattice.num_vertices()), -1);
   TetMesh& mesh = embedded.lattice;

@@ -81,4 +81,19 @@ Real WindingNumber::sum(int index, const Vector3& point) const {
   return total;
 }
 
+Real enclosure(const TriangleSurface& surface) {
+  const WindingNumber winding(surface);
+  Real sum = 0, total = 0;
+  for (int t = 0; t < static_cast<int>(surface.triangles.size()); ++t) {
+    const Matrix3 p = corners(surface, t);
+    const Vector3 normal = (p.col(1) - p.col(0)).cross(p.col(2) - p.col(0)), middle = p.rowwise().mean();
+    const Real area = normal.norm();
+    if (!(area > 0)) continue;
+    const Vector3 aside = normal * (1e-4 / std::sqrt(area));
+    sum += area * std::max(std::abs(winding.at(middle - aside)), std::abs(winding.at(middle + aside)));
+    total += area;
+  }
+  return total > 0 ? sum / total : 0;
+}
+
 }  // namespace penalty

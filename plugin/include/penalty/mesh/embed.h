@@ -19,7 +19,6 @@ struct EmbeddedSurface {
   std::vector<Tetrahedron> stencils;  // one a surface vertex
   Eigen::Matrix4Xd weights;           // 4 x surface vertices
   int pieces = 0;                     // of the lattice, joined by faces
-  int num_inside = 0;                 // tetrahedra that the surface does not touch: none of an open sheet
 };
 
 /// Covers `surface`, repaired first, with the tetrahedra of a body-centred cubic lattice that touch it or lie inside:

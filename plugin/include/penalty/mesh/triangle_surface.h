@@ -50,6 +50,10 @@ struct SurfaceTopology {
 };
 SurfaceTopology topology_of(const TriangleSurface& surface);
 
+/// How much of a solid's skin the surface is: the mean over its area of the winding number beside it, on the side where
+/// that is greater. 1 of what is closed, near it with small holes, 1/2 of a flat sheet.
+Real enclosure(const TriangleSurface& surface);
+
 /// Pieces that are joined by vertices, in the order of their first triangles, each with those that lie inside it: shells
 /// of cavities belong to the body around them. Vertices of no triangle go.
 std::vector<TriangleSurface> pieces_of(const TriangleSurface& surface);
