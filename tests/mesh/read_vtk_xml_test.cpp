@@ -92,6 +92,7 @@ TEST_F(ReadVtkXml, NamesFileLineArrayAndValue) {
             "a.vtu:31: cell 2: type 42 is not read: save the mesh with cells of first or second order");
   EXPECT_EQ(broken("NumberOfPoints=\"5\"", "NumberOfPoints=\"-5\""),
             "a.vtu:5: NumberOfPoints is '-5', must be a count");
+  EXPECT_EQ(broken("NumberOfPoints=\"5\"", "NumberOfPoints=\"5x\""), "a.vtu:5: NumberOfPoints is '5x', not an integer");
   EXPECT_EQ(broken("NumberOfCells=\"3\"", "NumberOfCells=\"3000000000\""),
             "a.vtu:5: NumberOfCells is '3000000000', must be a count");
   EXPECT_EQ(broken("NumberOfPoints=\"5\"", "NumberOfPoints=\"500000000\"").substr(0, 60),
@@ -125,6 +126,23 @@ TEST_F(ReadVtkXml, NamesEncodedDataThatIsNotWhatItShouldBe) {
   }
   EXPECT_EQ(complaint(replaced(packed, "offset=\"0\"", "offset=\"100000\"")).substr(0, 57),
             "a.vtu:7: array 'fixed': offset '100000' is not in the app");
+}
+
+TEST_F(ReadVtkXml, RefusesPiecesThatAllClaimTheSameData) {
+  VtkXmlWriter writer({.format = "appended", .raw = true});
+  std::string piece = "<Piece NumberOfPoints=\"5000\" NumberOfCells=\"1\"><Points>\n";
+  std::vector<double> coordinates(15000, 0.0);
+  for (int k = 0; k < 15000; ++k) coordinates[k] = static_cast<double>(std::int64_t{k} * k * k % 1009);
+  piece +=
+      writer.array("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", coordinates) + "</Points><Cells>\n";
+  piece += writer.array("type=\"Int8\" Name=\"connectivity\"", std::vector<std::int8_t>{0, 1, 2, 3});
+  piece += writer.array("type=\"Int8\" Name=\"offsets\"", std::vector<std::int8_t>{4});
+  piece += writer.array("type=\"Int8\" Name=\"types\"", std::vector<std::int8_t>{10}) + "</Cells></Piece>\n";
+  EXPECT_EQ(read(writer.file(piece)).tetrahedra.size(), 1u);
+  std::string pieces;
+  for (int k = 0; k < 100; ++k) pieces += piece;
+  EXPECT_EQ(complaint(writer.file(pieces)),
+            "a.vtu:20: array 'Points': with it there is more data than the file can hold");
 }
 
 }  // namespace

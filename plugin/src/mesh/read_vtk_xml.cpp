@@ -166,9 +166,15 @@ class VtkXmlReader {
     return found;
   }
 
+  // -1 if there is none.
+  std::int64_t integer(pugi::xml_node node, const char* attribute) const {
+    TextCursor text(file_, node.attribute(attribute).value(), '\0',
+                    line_of(static_cast<std::size_t>(node.offset_debug())));
+    return text.at_end() ? -1 : text.integer(attribute);
+  }
+
   std::int64_t count(pugi::xml_node node, const char* attribute) const {
-    TextCursor text(file_, node.attribute(attribute).value());
-    const std::int64_t value = text.at_end() ? -1 : text.integer(attribute);
+    const std::int64_t value = integer(node, attribute);
     if (value < 0 || value >= std::numeric_limits<int>::max())
       fail(node, std::string(attribute) + " is " + in_quotes(node.attribute(attribute).value()) + ", must be a count");
     return value;
@@ -243,8 +249,7 @@ class VtkXmlReader {
     const std::string_view format = array.attribute("format").value();
     std::vector<T> numbers;
     if (format == "appended") {
-      TextCursor offset(file_, array.attribute("offset").value());
-      const std::int64_t at = offset.at_end() ? -1 : offset.integer("offset");
+      const std::int64_t at = integer(array, "offset");
       if (at < 0 || static_cast<std::size_t>(at) > appended_.size())
         fail(array, name + ": offset " + in_quotes(array.attribute("offset").value()) + " is not in the appended data");
       decode(array, name, ByteStream(appended_.substr(static_cast<std::size_t>(at)), appended_encoding_), *type, count,
@@ -278,6 +283,9 @@ class VtkXmlReader {
   void decode(pugi::xml_node array, const std::string& name, ByteStream stream, NumberType type, std::int64_t count,
               std::vector<T>& numbers) {
     const std::uint64_t wanted = static_cast<std::uint64_t>(count) * type.size;
+    num_decoded_ += wanted;
+    if (num_decoded_ > (is_compressed_ ? most_inflated(contents_.size()) : 2 * contents_.size()))
+      fail(array, name + ": with it there is more data than the file can hold");
     const std::string bytes =
         is_compressed_ ? inflated(array, name, stream, wanted) : plain(array, name, stream, wanted);
     numbers.reserve(static_cast<std::size_t>(count));
@@ -341,6 +349,7 @@ class VtkXmlReader {
   bool is_compressed_ = false;
   std::endian order_ = std::endian::little;
   std::size_t header_size_ = 4;
+  std::uint64_t num_decoded_ = 0;  // [bytes] of all arrays, which might all claim the same data
   RawMesh mesh_;
   VtkCells cells_;
   int num_pieces_ = 0;
