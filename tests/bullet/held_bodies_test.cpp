@@ -120,6 +120,22 @@ TEST_P(Held, ABodyWithANodeTooMany) {
   expect_recovered();
 }
 
+TEST_P(Held, ABodyWithAFaceOfAnotherOnesNode) {
+  body->appendFace(0, 1, 2);
+  const int face = body->m_faces.size() - 1;
+  body->m_faces[face].m_n[1] = &others[0]->m_nodes[0];
+  expect_at_rest();
+  const std::string what = "face " + std::to_string(face) + ": its node 1 is none of this body";
+  EXPECT_EQ(problem(), what + ": take it away");
+  sim.penalty().detach(*body);
+  EXPECT_EQ(complaint<std::invalid_argument>(
+                [&] { sim.penalty().attach(*body, make_elastic_field(ball.vertices, ball.tetrahedra, 10.0)); }),
+            "attach: " + what);
+  body->m_faces.pop_back();
+  sim.penalty().attach(*body, make_elastic_field(ball.vertices, ball.tetrahedra, 10.0));
+  expect_recovered();
+}
+
 TEST_P(Held, AConstraintThatThrows) {
   PotentialField moody(ball.vertices);
   moody.add<Moody>(edges_of(ball.tetrahedra), 1);

@@ -26,6 +26,19 @@ void check(const btVector3& v, int node, const std::string& what) {
     if (!std::isfinite(v[axis])) refuse(node, what + " " + "xyz"[axis], Real(v[axis]), "finite");
 }
 
+// Names the first that has a node of another body: of faces, or of links where there are none. Empty: none has.
+std::string foreign_part(const btSoftBody& body) {
+  const auto foreign = [&body](const char* what, const auto& parts, int corners) -> std::string {
+    for (int i = 0; i < parts.size(); ++i)
+      for (int k = 0; k < corners; ++k)
+        if (index_of(body, parts[i].m_n[k]) < 0)
+          return std::string(what) + " " + std::to_string(i) + ": its node " + std::to_string(k) +
+                 " is none of this body";
+    return "";
+  };
+  return body.m_faces.size() > 0 ? foreign("face", body.m_faces, 3) : foreign("link", body.m_links, 2);
+}
+
 }  // namespace
 
 int index_of(const btSoftBody& body, const btSoftBody::Node* node) {
@@ -38,8 +51,10 @@ int index_of(const btSoftBody& body, const btSoftBody::Node* node) {
   return is_one ? static_cast<int>(index) : -1;
 }
 
-Nodes::Nodes(btSoftBody& body, Particles& particles) : body_(&body) {
+Nodes::Nodes(btSoftBody& body, Particles& particles)
+    : body_(&body), checked_parts_{body.m_faces.size(), body.m_links.size()} {
   const int size = body.m_nodes.size();
+  if (const std::string what = foreign_part(body); !what.empty()) throw std::invalid_argument("attach: " + what);
   particles.positions = PackedVectors::Zero(4, size);
   particles.velocities = PackedVectors::Zero(4, size);
   particles.inverse_masses.resize(size);
@@ -68,6 +83,10 @@ NodeChanges Nodes::read(Particles& particles, Real duration) {
   if (body_->m_nodes.size() != particles.size())
     throw std::logic_error("the soft body has " + std::to_string(body_->m_nodes.size()) + " nodes, had " +
                            std::to_string(particles.size()) + " when it was attached: detach it, attach it again");
+  if (const std::array<int, 2> parts{body_->m_faces.size(), body_->m_links.size()}; parts != checked_parts_) {
+    if (const std::string what = foreign_part(*body_); !what.empty()) throw std::logic_error(what + ": take it away");
+    checked_parts_ = parts;
+  }
   NodeChanges changes;
   rejected_ = {};
   for (const LedNode& led : led_)  // of a step that was given up

@@ -2,6 +2,7 @@
 #pragma once
 #include <BulletSoftBody/btSoftBody.h>
 
+#include <array>
 #include <vector>
 
 #include "penalty/stepping/particles.h"
@@ -37,13 +38,13 @@ struct RejectedNode {
 class Nodes {
  public:
   /// Fills `particles` from the nodes. Throws std::invalid_argument that names the node whose position, velocity or
-  /// inverse mass is out of range.
+  /// inverse mass is out of range, or the face or link that has a node of another body.
   Nodes(btSoftBody& body, Particles& particles);
 
   /// Adds what others changed. Numbers that are not finite, and inverse masses that are negative, are set back, see
   /// `rejected`. Pinned nodes that were moved, while no free one was, get the velocity that takes them there in
   /// `duration` [s]: until `arrive` they are where they were. Without a duration, or a free node, they jump. Throws
-  /// std::logic_error if the body has another number of nodes than it had.
+  /// std::logic_error if the body has another number of nodes than it had, or a new face or link with a node of another.
   NodeChanges read(Particles& particles, Real duration = 0);
 
   /// Ends the ways that `read` began: these particles are where they were led to, and so is where a failed step goes
@@ -97,6 +98,7 @@ class Nodes {
   void lead(Particles& particles, Real duration, NodeChanges& changes);
 
   btSoftBody* body_;
+  std::array<int, 2> checked_parts_;  // how many faces and links had nodes of this body only
   btAlignedObjectArray<btVector3> written_positions_, written_velocities_;
   std::vector<btScalar> read_inverse_masses_;
   std::vector<LedNode> led_;
