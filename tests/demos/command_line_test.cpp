@@ -116,7 +116,7 @@ TEST(CommandLine, RefusesBrokenMeshes) {
         Broken{"empty.vtk", header + points + "CELLS 0 0\nCELL_TYPES 0\n", "empty.vtk"},
         Broken{"huge.vtk", header + "POINTS 44739242 double\n0 0 0\n", "huge.vtk"},
         Broken{"nothing.vtk", "", "nothing.vtk"},
-        Broken{"open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "open.obj"},
+        Broken{"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "lines.obj: the surface has no triangles"},
         Broken{"words.txt", "not a mesh", "words.txt"}}) {
     std::ofstream(directory / broken.name) << broken.text;
     SCOPED_TRACE(broken.name);
