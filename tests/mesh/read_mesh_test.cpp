@@ -30,6 +30,11 @@ TEST_F(ReadMesh, NamesWhatIsNoMeshFile) {
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "none"); }), "none: no such file");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "folder.vtk"); }), "folder.vtk: is a directory, not a mesh file");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "empty.vtk"); }), "empty.vtk: the file is empty");
+  for (const char* file : {"mark.vtk", "mark.msh", "mark.node"}) {
+    write(file, "\xef\xbb\xbf");
+    EXPECT_EQ(mesh_error([&] { read_mesh(folder() / file); }),
+              std::string(file) + ": the file is empty but for a byte order mark");
+  }
   write("pointer.msh", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
   EXPECT_EQ(mesh_error([&] { read_mesh(folder() / "pointer.msh"); }),
             "pointer.msh: a pointer of Git LFS, not the file: `git lfs pull` fetches that");

@@ -37,6 +37,7 @@ std::string load_file(const std::filesystem::path& path) {
   stream.read(text.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uintmax_t>(stream.gcount()) != size) throw MeshError(name + ": cannot be read to its end");
   if (text.starts_with("\xef\xbb\xbf")) text.erase(0, 3);  // a byte order mark
+  if (text.empty()) throw MeshError(name + ": the file is empty but for a byte order mark");
   if (text.starts_with("version https://git-lfs."))
     throw MeshError(name + ": a pointer of Git LFS, not the file: `git lfs pull` fetches that");
   return text;

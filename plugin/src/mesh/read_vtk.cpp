@@ -1,5 +1,4 @@
 // VTK legacy files with an UNSTRUCTURED_GRID, ASCII or BINARY (big-endian).
-#include <algorithm>
 #include <charconv>
 #include <optional>
 
@@ -334,8 +333,8 @@ class VtkReader {
 
 TetMesh read_vtk(const std::filesystem::path& path) {
   const std::string contents = load_file(path);
-  if (contents[std::min(contents.find_first_not_of(" \t\r\n"), contents.size() - 1)] == '<')
-    return read_vtk_xml(path.string(), contents);
+  const std::size_t first = contents.find_first_not_of(" \t\r\n");
+  if (first != contents.npos && contents[first] == '<') return read_vtk_xml(path.string(), contents);
   return VtkReader(path.string(), contents).read();
 }
 
