@@ -44,6 +44,13 @@ BodyMesh embedded(const std::filesystem::path& path, const SceneOptions& options
 
 }  // namespace
 
+const TetMesh& BodyMesh::solid() const {
+  if (is_shell())
+    throw std::invalid_argument(source() +
+                                ": an open sheet where a solid is wanted: close it, or let it fall as cloth (drop)");
+  return std::get<TetMesh>(mesh);
+}
+
 const Eigen::Matrix3Xd& BodyMesh::vertices() const {
   return std::visit([](const auto& m) -> const Eigen::Matrix3Xd& { return m.vertices; }, mesh);
 }

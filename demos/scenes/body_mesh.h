@@ -18,7 +18,7 @@ struct BodyMesh {
   std::string repairs() const;
 
   bool is_shell() const { return std::holds_alternative<TriangleSurface>(mesh); }
-  const TetMesh& solid() const { return std::get<TetMesh>(mesh); }
+  const TetMesh& solid() const;  // throws std::invalid_argument, in one line, for a shell
   const TriangleSurface& shell() const { return std::get<TriangleSurface>(mesh); }
 
   // Whichever of the two it is.

@@ -1,7 +1,6 @@
 // A body is put into one impossible shape after another and finds back each time, with nothing but its own forces.
 #include <algorithm>
 #include <memory>
-#include <stdexcept>
 
 #include "scenes/scene_setup.h"
 #include "scenes/shape_measure.h"
@@ -35,7 +34,6 @@ struct Tally {
 BodyMesh recover_body(const SceneOptions& options) { return load_body(options, "torus"); }
 
 SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
-  if (body.is_shell()) throw std::invalid_argument("scene recover needs tetrahedra");
   Elasticity elastic = elasticity(options, body.solid(), jelly, ElasticModel::neo_hookean, 2);
   const Eigen::Matrix3Xd& rest = body.vertices();
   SceneSetup setup{

@@ -123,6 +123,15 @@ TEST(CommandLine, RefusesBrokenMeshes) {
     const Outcome outcome = run_demo({"run", "drop", "--no-render", "--mesh", (directory / broken.name).string()});
     expect_refusal(outcome, broken.mentions);
   }
+  const std::string sheet = (directory / "sheet.obj").string();
+  std::ofstream(sheet) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  for (const char* scene : {"flight", "collide", "incline", "press", "bounce", "hand", "recover"}) {
+    SCOPED_TRACE(scene);
+    expect_refusal(run_demo({"run", scene, "--no-render", "--mesh", sheet}),
+                   "sheet.obj: an open sheet where a solid is wanted");
+  }
+  expect_refusal(run_demo({"run", "drop", "--no-render", "--model", "springs", "--mesh", sheet}),
+                 "--model is for solids");
   expect_refusal(run_demo({"run", "drop", "--no-render", "--mesh", directory.path().string()}), "directory");
   expect_refusal(run_demo({"run", "drop", "--no-render", "--mesh", (directory / "missing.vtk").string()}),
                  "missing.vtk");
