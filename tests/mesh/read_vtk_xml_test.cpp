@@ -99,6 +99,9 @@ TEST_F(ReadVtkXml, NamesFileLineArrayAndValue) {
             "a.vtu:20: the size of array 'Points' is 1500000000, more tha");
   EXPECT_EQ(broken("Name=\"types\"", "Name=\"kinds\""), "a.vtu:24: there is no array 'types'");
   EXPECT_EQ(broken("type=\"Float64\"", "type=\"Float16\""), "a.vtu:20: array 'Points': type 'Float16' is not read");
+  for (const char* format : {"ascii", "binary"})  // 1e300 is no number of a corner
+    EXPECT_EQ(complaint(replaced(vtk_xml({.format = format}), "\"Int64\" Name=\"conn", "\"Float64\" Name=\"conn")),
+              "a.vtu:25: array 'connectivity': type 'Float64' is not read");
   EXPECT_EQ(broken("</Cells>", "</Cell>").substr(0, 31), "a.vtu:34: not well-formed XML: ");
   EXPECT_EQ(complaint("<html></html>"), "a.vtu:1: not a file of VTK: there is no VTKFile");
   EXPECT_EQ(broken("<Piece NumberOfPoints=\"5\" NumberOfCells=\"3\">", "<Part>").substr(0, 9), "a.vtu:35:");

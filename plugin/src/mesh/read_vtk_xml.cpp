@@ -245,7 +245,8 @@ class VtkXmlReader {
   std::vector<T> values(pugi::xml_node array, std::int64_t count) {
     const std::string name = "array " + in_quotes(array.attribute("Name").value());
     const std::optional<NumberType> type = xml_number_type(array.attribute("type").value());
-    if (!type) fail(array, name + ": type " + in_quotes(array.attribute("type").value()) + " is not read");
+    if (!type || (std::is_same_v<T, std::int64_t> && type->sort == NumberType::Sort::floating))
+      fail(array, name + ": type " + in_quotes(array.attribute("type").value()) + " is not read");
     const std::string_view format = array.attribute("format").value();
     std::vector<T> numbers;
     if (format == "appended") {
