@@ -181,7 +181,8 @@ TEST(Embed, FillsSurfacesWithHolesDoubledFacesAndTrianglesThatFaceTheOtherSide) 
   std::erase_if(pierced.triangles, [&](const Triangle&) { return count++ % 30 == 0; });
   ASSERT_FALSE(topology_of(pierced).is_closed());
   const EmbeddedSurface filled = embed(pierced, {.cells = 12});
-  EXPECT_NEAR(volume(filled.lattice), volume(whole.lattice), 0.02 * volume(whole.lattice));
+  // But for what only the missing triangles touched, less than a thousandth.
+  EXPECT_NEAR(volume(filled.lattice), volume(whole.lattice), 0.001 * volume(whole.lattice));
   TriangleSurface cut = ball;
   std::erase_if(cut.triangles, [&](const Triangle& t) { return ball.vertices(1, t[0]) > 0.5; });
   const EmbeddedSurface bowl = embed(cut, {.cells = 12});
