@@ -4,8 +4,12 @@
 #include <cmath>
 
 #include "energy_guard.h"
+#include "implicit_contacts.h"
+#include "particle_contacts.h"
+#include "restitution.h"
 #include "rigid_state.h"
 #include "stepped_body.h"
+#include "surface_contacts.h"
 
 namespace penalty {
 namespace {
@@ -15,11 +19,28 @@ constexpr Real growth_noise = 1e-12;        // relative growth of energy that is
 constexpr Real sum_round_off = 1e-12;       // of a sum of forces, relative to the sum of their magnitudes
 constexpr Real round_off2 = 1e-28;          // square of that of positions, relative to the size of the body
 
+// In contact:
+constexpr Real friction_change = 0.01;                       // of the limits of friction, of their sum, that is left
+constexpr int fewest_between_updates = 4, most_updates = 3;  // iterations, and of the limits
+constexpr int times_iterations = 3;                          // as many as without contact, at most
+constexpr Real kept_stiffness =
+    0.005;  // motion, relative to the distance of particles, that leaves the stiffness as it is
+constexpr int oldest_stiffness = 4;  // iterations that it is kept
+constexpr Real slow_fall = 0.25;     // of the residual in an iteration: then the stiffness is assembled anew
+constexpr Real settled_gap = 1e-3;   // of what presses [m/s]
+constexpr Real sudden = 5;           // approach [speeds gained by gravity in a step] that is an impact
+
 /// One backward Euler step of a body.
 class ImplicitStep {
  public:
-  ImplicitStep(SteppedBody& body, Real duration)
-      : body_(body), particles_(body.particles), state_(body.implicit), newton_(state_.newton), duration_(duration) {
+  ImplicitStep(Island& island, Real duration)
+      : island_(island),
+        body_(*island.bodies.front()),
+        particles_(body_.particles),
+        state_(body_.implicit),
+        newton_(state_.newton),
+        duration_(duration) {
+    SteppedBody& body = body_;
     if (!newton_.has_pattern_of(*body.field)) newton_.set_pattern(*body.field);
     newton_.clear_fixed();
     for (int i = 0; i < particles_.size(); ++i)
@@ -36,6 +57,9 @@ class ImplicitStep {
 
   void run();
 
+  /// Of obstacles that move, and of taking depth back, so far [J].
+  Real outside_work() const { return outside_work_; }
+
   /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned
   /// particles from all velocities.
   void cap_energy(Real allowed);
@@ -43,15 +67,20 @@ class ImplicitStep {
  private:
   void aim();
   void choose_start();
+  Real noise() const;
   void minimize();
-  void restore_momenta(const RigidState& before);
+  void minimize_in_contact(ImplicitContacts& contacts);
+  void restore_momenta(const RigidState& before, const ImplicitContacts& contacts);
   bool is_free() const { return newton_.fixed().empty(); }
+  Real stiffness_range() const { return kept_stiffness * body_.size / std::cbrt(static_cast<Real>(particles_.size())); }
 
+  Island& island_;
   SteppedBody& body_;
   Particles& particles_;
   ImplicitState& state_;
   NewtonSolver& newton_;
-  Real duration_;
+  Real duration_, outside_work_ = 0;
+  bool touches_ = false;
 };
 
 // Where the particles would be without elastic forces; pinned ones go where their velocity takes them.
@@ -96,22 +125,72 @@ void ImplicitStep::choose_start() {
   newton_.offer(guess);
 }
 
+// What is left of forces where nothing is, by round-off.
+Real ImplicitStep::noise() const {
+  const Real stiffness = 1 / (duration_ * duration_) + body_.largest_eigenvalue;  // of inertia and elements, per mass
+  return round_off2 * body_.mass * stiffness * body_.rest_span.spreads.squaredNorm();
+}
+
 void ImplicitStep::minimize() {
   const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
-  const Real stiffness = 1 / (duration_ * duration_) + body_.largest_eigenvalue;  // of inertia and elements, per mass
-  const Real noise = round_off2 * body_.mass * stiffness * body_.rest_span.spreads.squaredNorm();
   Real enough = 0;
   for (int k = 0; k < body_.options.newton_iterations; ++k) {
     const NewtonIteration iteration = newton_.iterate();
     ++body_.report.newton_iterations;
     body_.report.linear_iterations += iteration.linear_iterations;
-    if (k == 0) enough = std::max(tolerance2 * iteration.before, noise);
+    if (k == 0) enough = std::max(tolerance2 * iteration.before, noise());
     if (iteration.length == 0 || iteration.after <= enough) break;
   }
 }
 
+// By iterations that hold the limits of friction, and updates of these in between.
+void ImplicitStep::minimize_in_contact(ImplicitContacts& contacts) {
+  const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
+  Real scale = 0;
+  for (int i = 0; i < particles_.size(); ++i) {
+    const Vector3 way = (newton_.objective.targets.col(i) - state_.from.col(i)).head<3>();
+    scale += newton_.objective.weights[i] * way.squaredNorm() / 2;
+  }
+  const Real enough = std::max(tolerance2 * scale, noise());
+  const int most = times_iterations * body_.options.newton_iterations;
+  int since_update = 0, updates = 0, age = 0;
+  bool is_fresh = true;  // linearised here
+  newton_.linearize(newton_.may_keep_stiffness(newton_.positions(), stiffness_range()));
+  Real left = newton_.squared_residual(), before = left;
+  for (int k = 0;;) {
+    const bool is_balanced = left <= enough;
+    if (k > 0 && (is_balanced || since_update >= fewest_between_updates)) {
+      const ImplicitContacts::Change change = contacts.limit_change(newton_.positions());
+      const bool is_settled = change.limits <= friction_change * change.sum && change.gap < settled_gap * duration_;
+      if ((is_settled && is_balanced) || (updates >= most_updates && is_balanced) || k >= most) break;
+      ++updates;
+      since_update = 0;
+      contacts.update(newton_.positions(), is_balanced);
+      newton_.evaluate_again();
+      left = before = newton_.squared_residual();
+    }
+    if (k >= most || !std::isfinite(left)) break;
+    if (!is_fresh) {
+      const bool is_slow = since_update > 1 && left > slow_fall * before;
+      const bool keeps = !is_slow && age < oldest_stiffness;
+      age = keeps ? age + 1 : 0;
+      newton_.linearize(keeps);
+    }
+    is_fresh = false;
+    const NewtonIteration iteration = newton_.descend();
+    contacts.follow(iteration.length, newton_.direction());
+    ++k;
+    ++since_update;
+    ++body_.report.newton_iterations;
+    body_.report.linear_iterations += iteration.linear_iterations;
+    before = left;
+    left = newton_.squared_residual();
+    if (iteration.length == 0) break;
+  }
+}
+
 // What the minimum, and iterations that end before it, take from the momenta of a free body.
-void ImplicitStep::restore_momenta(const RigidState& before) {
+void ImplicitStep::restore_momenta(const RigidState& before, const ImplicitContacts& contacts) {
   // Of the potential: only what acts from outside leaves any.
   Vector3 force = Vector3::Zero(), torque = Vector3::Zero();
   Real forces = 0, torques = 0;
@@ -124,7 +203,7 @@ void ImplicitStep::restore_momenta(const RigidState& before) {
   }
   if (force.norm() < sum_round_off * forces) force.setZero();
   if (torque.norm() < sum_round_off * torques) torque.setZero();
-  Vector3 momentum = before.momentum + duration_ * (before.mass * body_.gravity + force);
+  Vector3 momentum = before.momentum + duration_ * (before.mass * body_.gravity + force) + contacts.impulse();
   Vector3 spin = before.spin + duration_ * torque;
   if (body_.external_forces.size() != 0)
     for (int i = 0; i < particles_.size(); ++i) {
@@ -133,13 +212,14 @@ void ImplicitStep::restore_momenta(const RigidState& before) {
       spin += (state_.from.col(i).head<3>() - before.center).cross(impulse);
     }
   const RigidState now(particles_);
+  if (touches_) spin = now.spin;  // is no longer its own: given back on a way that obstacles bend, it would gain energy
   const Vector3 dv = (momentum - now.momentum) / now.mass, dw = now.angular_velocity(spin - now.spin);
   body_.report.restored_momentum = (momentum - now.momentum).norm();
   body_.report.restored_spin = (spin - now.spin).norm();
   for (int i = 0; i < particles_.size(); ++i) {
     const Vector3 arm = particles_.positions.col(i).head<3>() - now.center;
     particles_.velocities.col(i).head<3>() += dv + dw.cross(arm);
-    particles_.positions.col(i).head<3>() += duration_ * dv;
+    if (!touches_) particles_.positions.col(i).head<3>() += duration_ * dv;
   }
 }
 
@@ -169,9 +249,30 @@ void ImplicitStep::cap_energy(Real allowed) {
 
 void ImplicitStep::run() {
   state_.from = particles_.positions;
+  ImplicitContacts contacts(island_, state_.contacts, duration_);
+  touches_ = !contacts.is_empty();
+  newton_.objective.contacts = touches_ ? &contacts : nullptr;
   aim();
-  choose_start();
-  minimize();
+  if (!touches_) {
+    choose_start();
+    minimize();
+  } else {
+    if (!newton_.has_stiffness()) {
+      newton_.objective.contacts = nullptr;
+      newton_.prepare();
+      newton_.start(state_.from);
+      newton_.linearize();
+      newton_.objective.contacts = &contacts;
+    }
+    contacts.set_hardness(newton_);
+    choose_start();
+    contacts.predict(particles_.velocities, newton_.objective.targets, sudden * duration_ * body_.gravity.norm());
+    minimize_in_contact(contacts);
+  }
+  contacts.finish(newton_.positions(), state_.contacts);
+  newton_.objective.contacts = nullptr;
+  body_.step_flows.contacts += contacts.work();
+  outside_work_ += contacts.outside_work();
   const PackedVectors& end = newton_.positions();
   const RigidState before = is_free() ? RigidState(particles_) : RigidState();
   state_.acceleration = ((end - state_.from) / duration_ - particles_.velocities) / duration_;
@@ -179,7 +280,8 @@ void ImplicitStep::run() {
   for (int i = 0; i < particles_.size(); ++i)
     if (particles_.inverse_masses[i] > 0) particles_.velocities.col(i) = (end.col(i) - state_.from.col(i)) / duration_;
   particles_.positions = end;
-  if (is_free()) restore_momenta(before);
+  if (is_free()) restore_momenta(before, contacts);
+  for (RigidBody& rigid : island_.rigid_bodies) rigid.drift(duration_);
 
   body_.elastic_energy = newton_.elastic_energy();
   body_.forces = newton_.forces();
@@ -190,23 +292,40 @@ void ImplicitStep::run() {
   if (body_.field->evolves()) {
     const Real taken = body_.field->evolve(particles_.positions, duration_);
     body_.step_flows.inelastic += taken;
-    if (taken != 0) evaluate_forces(body_);
+    if (taken != 0) {
+      evaluate_forces(body_);
+      newton_.forget_stiffness();
+    }
   }
 }
 
 }  // namespace
 
-void advance_implicitly(SteppedBody& body, Real duration) {
+void advance_implicitly(Island& island, Real duration) {
+  SteppedBody& body = *island.bodies.front();
+  island.rigid_start = island.rigid_bodies;
   const Real start_energy = begin_step(body);
+  body.implicit.contacts_at_start = body.implicit.contacts;
   StepReport& report = body.report;
   report.integrator = Integrator::implicit_step;
   EnergyFlows& flows = body.step_flows;
+  const auto undo = [&] {
+    undo_step(body);
+    island.rigid_bodies = island.rigid_start;
+    body.implicit.newton.forget_stiffness();
+    body.implicit.contacts = body.implicit.contacts_at_start;
+  };
+  Real outside_work = 0;
   const auto attempt = [&](int substeps) {
     flows = {};
-    ImplicitStep step(body, duration / substeps);
+    for (Contact& contact : island.contacts) contact.given = {};
+    ImplicitStep step(island, duration / substeps);
     for (int k = 0; k < substeps; ++k) step.run();
     flows.constant_forces = constant_force_work(body);
-    const Real allowed = start_energy + flows.received() - flows.lost();
+    outside_work = step.outside_work();
+    // What contacts and damping take is not asked for: of a body that turns on its way, the latter is not what its work is.
+    const Real allowed =
+        start_energy + flows.received() - flows.contacts + outside_work - (flows.lost() - flows.damping);
     // What drives pinned particles is known to the order of the step only.
     const bool is_driven = flows.driving != 0;
     if (!is_driven) step.cap_energy(allowed);
@@ -217,20 +336,27 @@ void advance_implicitly(SteppedBody& body, Real duration) {
                    .allowed = allowed,
                    .noise = tolerance * std::max(start_energy, end_energy) + body.energy_noise};
   };
-  const GuardedStep step = guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2},
-                                        attempt, [&] { undo_step(body); });
+  const GuardedStep step =
+      guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2}, attempt, undo);
   report.substeps = step.attempt.substeps;
   report.retries = step.retries;
   report.finite = step.finite;
+  report_particle_contacts(island);
+  SurfaceContacts surfaces(island);
+  find_records(island, surfaces);
   if (step.finite) {
-    flows.integration = step.attempt.allowed - step.attempt.energy;
+    const Real missing = step.attempt.allowed - outside_work + flows.contacts - step.attempt.energy;
+    flows.contact_loss = outside_work - flows.contacts;
+    flows.damping = std::clamp<Real>(missing, 0, flows.damping);
+    flows.integration = missing - flows.damping;
   } else {
-    SteppedBody* bodies[] = {&body};
-    name_bad_particles(bodies);
-    undo_step(body);
+    island.records.clear();
+    name_bad_particles(island.bodies);
+    undo();
     flows = {};
     body.implicit.has_acceleration = false;
   }
+  give_back(island, duration);
   end_step(body, step.finite ? duration : 0);
 }
 

@@ -1,9 +1,10 @@
-// One step of one body by backward Euler.
+// One step by backward Euler of one body and what it touches.
 #pragma once
 #include "penalty/stepping/island.h"
 
 namespace penalty {
 
-void advance_implicitly(SteppedBody& body, Real duration);
+/// Of an island that consists of one body and of contacts of its points with what takes no impulse.
+void advance_implicitly(Island& island, Real duration);
 
 }  // namespace penalty

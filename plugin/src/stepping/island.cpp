@@ -10,21 +10,40 @@
 namespace penalty {
 namespace {
 
-bool wants_implicit_step(const SteppedBody& body, Real duration) {
+// Slower than what comes to rest, seen from what it touches.
+bool lies(const Island& island) {
+  const SteppedBody& body = *island.bodies.front();
+  const RigidBody& ground = island.rigid_bodies[island.contacts.front().b.rigid];
+  const Real limit = body.options.settling_speed * std::sqrt(body.gravity.norm() * body.size);
+  for (int i = 0; i < body.particles.size(); ++i) {
+    const Vector3 arm = body.particles.positions.col(i).head<3>() - ground.position;
+    if (!((body.particles.velocities.col(i).head<3>() - ground.velocity_at(arm)).norm() < limit)) return false;
+  }
+  return true;
+}
+
+// An impact is for substeps, as long as they can be taken: backward Euler would eat the rebound.
+bool wants_implicit_step(const Island& island, Real duration) {
+  const SteppedBody& body = *island.bodies.front();
   if (body.particles.size() == 0) return false;
   if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
-  return body.options.substeps == 0 &&
-         duration * std::sqrt(body.largest_eigenvalue) / 2 > crossover_substeps * body.options.safety;
+  const bool touches = !island.contacts.empty();
+  const Real limit = duration * std::sqrt(body.largest_eigenvalue) / 2;
+  const Real share = touches ? body.options.contact_safety : body.options.safety;
+  if (body.options.substeps != 0 || !(limit > crossover_substeps * share)) return false;
+  return !touches || limit > body.options.max_substeps || lies(island);
 }
 
 bool steps_implicitly(Island& island, Real duration) {
-  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.contacts.empty() || !island.anchors.empty() ||
+  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.anchors.empty() ||
       !island.rigid_contacts.empty() || !island.joints.empty())
     return false;
-  if (!wants_implicit_step(*island.bodies.front(), duration)) return false;
+  for (const Contact& contact : island.contacts)
+    if (!contact.b.is_rigid() || island.rigid_bodies[contact.b.rigid].is_dynamic()) return false;
+  if (!wants_implicit_step(island, duration)) return false;
   SurfaceContacts surfaces(island);
   surfaces.begin_step(duration);
-  return surfaces.least_substeps() == 1;  // far from itself
+  return surfaces.least_substeps() == 1;  // far from itself, and from the edges of others
 }
 
 StepReport report_of(const Island& island) {
@@ -58,7 +77,7 @@ StepReport advance(Island& island, Real duration) {
   island.records.clear();
   if (island.bodies.empty() || !(duration > 0) || !std::isfinite(duration)) return {};
   if (steps_implicitly(island, duration))
-    advance_implicitly(*island.bodies.front(), duration);
+    advance_implicitly(island, duration);
   else
     advance_explicitly(island, duration);
   return report_of(island);

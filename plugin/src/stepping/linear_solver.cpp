@@ -48,6 +48,11 @@ void LinearSystem::clear_fixed(Forces v) const {
 void LinearSystem::multiply(const Vectors& x, Forces y) const {
   y.setZero();
   matrix.add_product(x, 1, y);
+  for (const ContactStiffness& contact : contacts) {
+    const Vector3 force = contact.stiffness * contact.point.of(x);
+    for (int k = 0; k < contact.point.size; ++k)
+      y.col(contact.point.particles[k]).head<3>() += contact.point.weights[k] * force;
+  }
   clear_fixed(y);
 }
 
@@ -62,41 +67,70 @@ void LinearSolver::set_pattern(const BlockMatrix& matrix) {
   std::vector<int> next(group_begin_.begin(), group_begin_.end() - 1);
   for (int i = 0; i < num_particles; ++i) group_members_[next[group_of_[i]]++] = i;
 
+  diagonal_.resize(num_particles);
   inverse_diagonal_.resize(num_particles);
   moves_.resize(num_particles);
   for (PackedVectors* v : {&arms_, &residual_, &preconditioned_, &search_, &product_}) v->setZero(4, num_particles);
+  coarse_blocks_.resize(6 * groups, 6 * groups);
   coarse_.resize(6 * groups, 6 * groups);
   coarse_scale_.resize(6 * groups);
   coarse_vector_.resize(6 * groups);
 }
 
 void LinearSolver::factorize(const LinearSystem& system, const Positions& x) {
+  std::fill(moves_.begin(), moves_.end(), 1);
+  for (const int i : system.fixed) moves_[i] = 0;
+  sum_blocks(system);
+  sum_coarse_blocks(system, x);
+  factorize_contacts(system);
+}
+
+void LinearSolver::factorize_contacts(const LinearSystem& system) {
+  invert_diagonal(system);
+  factorize_coarse(system);
+}
+
+void LinearSolver::sum_blocks(const LinearSystem& system) {
   const int num_particles = system.matrix.num_particles();
-  for (int i = 0; i < num_particles; ++i) inverse_diagonal_[i] = system.matrix.blocks().diagonal(i);
+  for (int i = 0; i < num_particles; ++i) diagonal_[i] = system.matrix.blocks().diagonal(i);
   for (const RankOneTerm& term : system.matrix.terms())
     if (term.coefficient > 0)
       for (std::size_t k = 0; k < term.particles.size(); ++k) {
         const Vector3 d = term.direction.col(static_cast<Eigen::Index>(k));
-        inverse_diagonal_[term.particles[k]] += term.coefficient * (d * d.transpose());
+        diagonal_[term.particles[k]] += term.coefficient * (d * d.transpose());
       }
+}
+
+void LinearSolver::invert_diagonal(const LinearSystem& system) {
+  inverse_diagonal_ = diagonal_;
+  for (const ContactStiffness& contact : system.contacts)
+    for (int k = 0; k < contact.point.size; ++k) {
+      const Real weight = contact.point.weights[k];
+      inverse_diagonal_[contact.point.particles[k]] += weight * weight * contact.stiffness;
+    }
   for (Matrix3& block : inverse_diagonal_) {
     const Real trace = block.trace();
     block.diagonal().array() += trace > 0 ? 1e-12 * trace : 1;
     block = block.inverse().eval();
   }
-  std::fill(moves_.begin(), moves_.end(), 1);
-  for (const int i : system.fixed) {
-    inverse_diagonal_[i].setZero();
-    moves_[i] = 0;
-  }
-  factorize_coarse(system, x);
+  for (const int i : system.fixed) inverse_diagonal_[i].setZero();
 }
 
-// The coarse matrix Zᵀ A Z, where column 6g + k of Z is the k-th rigid motion of group g: particle i, at r_i from its
-// centre, moves by t + w x r_i.
-void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions& x) {
+// What block (i, j) adds to the lower triangle of Zᵀ A Z, where column 6g + k of Z is the k-th rigid motion of group g:
+// particle i, at r_i from its centre, moves by t + w x r_i.
+void LinearSolver::add_coarse_block(int i, int j, const Matrix3& block, Eigen::MatrixXd& coarse) const {
+  const int row = 6 * group_of_[i], column = 6 * group_of_[j];
+  if (column > row || moves_[i] == 0 || moves_[j] == 0) return;
+  const Matrix3 arm_i = cross_matrix(arms_.col(i).head<3>());
+  const Matrix3 turned = block * cross_matrix(arms_.col(j).head<3>());
+  coarse.block<3, 3>(row, column) += block;
+  coarse.block<3, 3>(row, column + 3) -= turned;
+  coarse.block<3, 3>(row + 3, column) += arm_i * block;
+  coarse.block<3, 3>(row + 3, column + 3) -= arm_i * turned;
+}
+
+void LinearSolver::sum_coarse_blocks(const LinearSystem& system, const Positions& x) {
   const int groups = num_groups();
-  if (groups == 0) return;
   for (int g = 0; g < groups; ++g) {
     const std::span<const int> members(group_members_.data() + group_begin_[g],
                                        group_members_.data() + group_begin_[g + 1]);
@@ -107,22 +141,10 @@ void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions&
     const Real scale = radius2 > 0 ? 1 / std::sqrt(radius2) : 0;
     for (const int i : members) arms_.col(i).head<3>() = scale * (x.col(i).head<3>() - center);
   }
-  coarse_.setZero();
-  for (int i = 0; i < system.matrix.num_particles(); ++i) {
-    if (moves_[i] == 0) continue;
-    const Matrix3 arm_i = cross_matrix(arms_.col(i).head<3>());
-    const int row = 6 * group_of_[i];
-    system.matrix.blocks().visit_row(i, [&](int j, const Matrix3& block) {
-      const int column = 6 * group_of_[j];
-      if (column > row || moves_[j] == 0) return;
-      const Matrix3 arm_j = cross_matrix(arms_.col(j).head<3>());
-      const Matrix3 turned = block * arm_j;
-      coarse_.block<3, 3>(row, column) += block;
-      coarse_.block<3, 3>(row, column + 3) -= turned;
-      coarse_.block<3, 3>(row + 3, column) += arm_i * block;
-      coarse_.block<3, 3>(row + 3, column + 3) -= arm_i * turned;
-    });
-  }
+  coarse_blocks_.setZero();
+  for (int i = 0; i < system.matrix.num_particles(); ++i)
+    system.matrix.blocks().visit_row(
+        i, [&](int j, const Matrix3& block) { add_coarse_block(i, j, block, coarse_blocks_); });
   for (const RankOneTerm& term : system.matrix.terms()) {
     coarse_vector_.setZero();
     for (std::size_t k = 0; k < term.particles.size(); ++k) {
@@ -131,8 +153,18 @@ void LinearSolver::factorize_coarse(const LinearSystem& system, const Positions&
       coarse_vector_.segment<3>(row) += d;
       coarse_vector_.segment<3>(row + 3) += Vector3(arms_.col(i).head<3>()).cross(d);
     }
-    coarse_.selfadjointView<Eigen::Lower>().rankUpdate(coarse_vector_, term.coefficient);
+    coarse_blocks_.selfadjointView<Eigen::Lower>().rankUpdate(coarse_vector_, term.coefficient);
   }
+}
+
+void LinearSolver::factorize_coarse(const LinearSystem& system) {
+  if (num_groups() == 0) return;
+  coarse_ = coarse_blocks_;
+  for (const ContactStiffness& contact : system.contacts)
+    for (int k = 0; k < contact.point.size; ++k)
+      for (int l = 0; l < contact.point.size; ++l)
+        add_coarse_block(contact.point.particles[k], contact.point.particles[l],
+                         contact.point.weights[k] * contact.point.weights[l] * contact.stiffness, coarse_);
   for (Eigen::Index k = 0; k < coarse_.rows(); ++k)
     coarse_scale_[k] = coarse_(k, k) > 0 ? 1 / std::sqrt(coarse_(k, k)) : 0;
   for (Eigen::Index column = 0; column < coarse_.cols(); ++column) {

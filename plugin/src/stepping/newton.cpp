@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "implicit_contacts.h"
+
 namespace penalty {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr Real epsilon = 1e-16;
 
 void NewtonSolver::set_pattern(const PotentialField& field) {
   field_ = nullptr;  // until all of it is there
+  has_stiffness_ = false;
   const int num_particles = field.num_particles();
   system_.matrix = System::with_pattern(num_particles, [&](System& system) {
     field.add_stiffness(field.rest_positions(), StiffnessModel::psd_projected, system);
@@ -63,6 +66,11 @@ void NewtonSolver::evaluate(State& state) {
     state.value += state.damping;
     state.magnitude += state.damping;
   }
+  if (objective.contacts) {
+    const Real energy = objective.contacts->evaluate(x, state.gradient);
+    state.value += energy;
+    state.magnitude += std::abs(energy);
+  }
   system_.clear_fixed(state.gradient);
 }
 
@@ -101,13 +109,32 @@ void NewtonSolver::assemble() {
     const Real weight = objective.weights.empty() ? 0 : objective.weights[i];
     matrix.add_to_diagonal(i, weight + shift);
   }
+  has_stiffness_ = true;
+  assembled_at_ = here_.positions;
+  assembled_weights_ = objective.weights;
 }
 
-NewtonIteration NewtonSolver::iterate() {
-  NewtonIteration iteration;
-  assemble();
-  solver_.factorize(system_, here_.positions);
+void NewtonSolver::linearize(bool keeps_stiffness) {
+  if (!keeps_stiffness) assemble();
+  system_.contacts.clear();
   displacement_ = -here_.gradient;
+  if (objective.contacts) objective.contacts->linearize(here_.positions, system_.contacts, displacement_);
+  if (keeps_stiffness)
+    solver_.factorize_contacts(system_);
+  else
+    solver_.factorize(system_, here_.positions);
+}
+
+Real NewtonSolver::squared_residual() { return solver_.squared_norm(system_, here_.gradient); }
+
+bool NewtonSolver::may_keep_stiffness(const PackedVectors& x, Real distance) const {
+  if (!has_stiffness_ || assembled_weights_ != objective.weights) return false;
+  const Eigen::Matrix<Real, 4, 1> shift = (x - assembled_at_).rowwise().mean();
+  return !(((x - assembled_at_).colwise() - shift).colwise().squaredNorm().maxCoeff() > distance * distance);
+}
+
+NewtonIteration NewtonSolver::descend() {
+  NewtonIteration iteration;
   const LinearReport solved = solver_.solve(system_, displacement_, linear, direction_);
   iteration.linear_iterations = solved.iterations;
   iteration.before = solved.squared_norm;
@@ -127,7 +154,7 @@ NewtonIteration NewtonSolver::iterate() {
     if (falls || flat) {
       std::swap(here_, trial_);
       iteration.length = length;
-      iteration.after = solver_.squared_norm(system_, here_.gradient);
+      iteration.after = squared_residual();
       return iteration;
     }
     // The parabola through both values and the first slope, within reason.

@@ -118,7 +118,7 @@ Real Hit::loss_of(const SteppedBody& body) const {
   const EnergyFlows& flows = body.step_flows;
   const Real expected = body.last_energy.value_or(0) + flows.received() - flows.lost();
   const Real error = body.elastic_energy + kinetic_energy(body.particles) - expected;
-  return impact_.pressing / body.pressing * (flows.damping + flows.contact_loss - error);
+  return impact_.pressing / body.pressing * (flows.damping + flows.contact_loss + flows.integration - error);
 }
 
 void Hit::follow(Real duration) {

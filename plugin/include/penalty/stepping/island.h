@@ -1,5 +1,6 @@
 // One world step of all that touches or holds one another: many explicit substeps, or one implicit one.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -23,10 +24,17 @@ class SurfacePair;
 struct ParticleContactRow;
 struct SurfaceScratch;
 
+/// What a contact gave at the end of an implicit step: where the next one starts from.
+struct RememberedContact {
+  std::array<int, 4> particles;  // of the point, see WeightedPoint
+  Vector3 normal, force;         // [N]
+};
+
 /// What implicit steps keep between steps.
 struct ImplicitState {
   NewtonSolver newton;
-  PackedVectors acceleration;  // mean one of the last step [m/s²]
+  std::vector<RememberedContact> contacts, contacts_at_start;  // sorted by particles
+  PackedVectors acceleration;                                  // mean one of the last step [m/s²]
   bool has_acceleration = false;
   PackedVectors from, guess;  // what the step works in
 };
@@ -44,7 +52,10 @@ struct SteppedBody {
   EnergyFlows flows;                  // of all steps
 
   /// Forgets what was computed at earlier positions: call after changing positions, external forces or the field.
-  void positions_changed() { forces_valid = false; }
+  void positions_changed() {
+    forces_valid = false;
+    implicit.newton.forget_stiffness();
+  }
 
   // What the integrator keeps between steps.
   PackedVectors forces;  // at `particles.positions`, external ones included [N]
@@ -140,11 +151,12 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
 /// end of a step.
 ///
-/// Implicitly, a body by itself, see Integrator: the positions at the end minimise
+/// Implicitly, a body by itself or on what cannot move, see Integrator: the positions at the end minimise
 ///
-///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h
+///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h + contacts
 ///
-/// by projected Newton iterations with a line search. Unlike that minimum, which turns too slowly, the step keeps the
+/// by projected Newton iterations with a line search; contacts press and rub by stiff potentials of their own, with
+/// multipliers and limits of friction that are updated in between. Depth is taken back at half a metre a second at most. Unlike that minimum, which turns too slowly, the step keeps the
 /// angular momentum of a free body, and the linear one in spite of iterations that end early: a rigid velocity is
 /// added. Energy that would grow all the same is taken from the velocities that deform the body. StepReport says how
 /// much.

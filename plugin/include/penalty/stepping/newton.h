@@ -5,12 +5,15 @@
 
 namespace penalty {
 
+class ImplicitContacts;
+
 /// What is minimised over the positions of the particles that are not fixed:
 ///
 ///     Phi(x) = E(x) + sum_i w_i/2 |x_i - t_i|² - sum_i f_i . x_i + (x - x0)ᵀ D (x - x0) / 2
 ///
 /// E is the energy of the field; the implicit step has w_i = m_i / h² and t_i where particle i would be without forces;
-/// damping has D = damping matrix / h at x0, where the step began. Whatever is empty is left out.
+/// damping has D = damping matrix / h at x0, where the step began. Contacts add a potential of their own. Whatever is
+/// empty is left out.
 struct Objective {
   const PotentialField* field = nullptr;
   std::vector<Real> weights;  // w_i [N/m]
@@ -19,6 +22,7 @@ struct Objective {
   PackedVectors damped_from;  // x0 [m]; empty: no damping
   Real damping_time = 0;      // of the elements, besides their own [s]
   Real inverse_duration = 0;  // 1 / h [1/s]
+  ImplicitContacts* contacts = nullptr;
 };
 
 /// One iteration, from x to x + length * d.
@@ -56,7 +60,32 @@ class NewtonSolver {
   /// Begins at `x`, or, if Phi is less there, moves to `x`.
   void start(const PackedVectors& x);
   void offer(const PackedVectors& x);
-  NewtonIteration iterate();
+  NewtonIteration iterate() {
+    linearize();
+    return descend();
+  }
+
+  /// The two halves of an iteration, between which the preconditioner is that of here. `keeps_stiffness`: all but the
+  /// contacts stays as it was assembled last.
+  void linearize(bool keeps_stiffness = false);
+  NewtonIteration descend();
+
+  /// dPhi . P⁻¹ dPhi, with the last preconditioner: about twice what Phi could still fall by [J].
+  Real squared_residual();
+
+  /// After contacts have changed.
+  void evaluate_again() { evaluate(here_); }
+
+  /// Whether the stiffness that was assembled last, for the same weights and elements, is nearly that at `x`: no particle
+  /// has moved further than `distance` [m] against their mean.
+  bool may_keep_stiffness(const PackedVectors& x, Real distance) const;
+  bool has_stiffness() const { return has_stiffness_; }
+  void forget_stiffness() { has_stiffness_ = false; }
+
+  /// The diagonal block of a particle in the matrix that was assembled last, contacts left out [N/m].
+  Matrix3 stiffness_of(int particle) const { return system_.matrix.blocks().diagonal(particle); }
+  /// Of the last iteration [m].
+  const PackedVectors& direction() const { return direction_; }
 
   const PackedVectors& positions() const { return here_.positions; }
   const PackedVectors& forces() const { return here_.forces; }      // -dE/dx [N]
@@ -85,6 +114,9 @@ class NewtonSolver {
   State here_, trial_;
   Real energy_noise_ = 0;  // of the potential, a guess [J]
   PackedVectors direction_, displacement_, damping_force_;
+  bool has_stiffness_ = false;
+  PackedVectors assembled_at_;
+  std::vector<Real> assembled_weights_;
 };
 
 }  // namespace penalty

@@ -5,9 +5,10 @@
 namespace penalty {
 
 enum class Integrator {
-  automatic,      // explicit up to `crossover_substeps`, else implicit
+  automatic,  // explicit up to `crossover_substeps`, else implicit; in contact only what lies, or is too stiff to bounce
   explicit_step,  // sub-cycled velocity Verlet
-  implicit_step,  // backward Euler; where something touches the body or couples it to others, or where it is near itself: explicit
+  implicit_step,  // backward Euler, also on what cannot move; where the body touches what can, is coupled to others, or is
+                  // near itself or the edges of something: explicit
 };
 
 /// Substeps up to which sub-cycling costs less than an implicit step with its default options: as many were measured to
@@ -40,9 +41,9 @@ struct StepOptions {
   Real energy_tolerance = 0.005;  // relative growth of energy in a step above which it is repeated with more substeps
   int max_substeps = 20000;       // beyond this a step is taken as it is, if it is finite
   Real contact_slop = 1e-4;       // depth that is left alone [m]; of what is smaller than a metre so much less
-  int newton_iterations = 8;      // most of an implicit step
+  int newton_iterations = 8;      // most of an implicit step; in contact three times as many
   Real newton_tolerance = 1e-3;   // ends them: what is left of the forces that are not balanced, in the norm of the
-                                  // preconditioner
+                                  // preconditioner; in contact of those that inertia would need for the whole way
   LinearOptions linear = {};      // of each Newton iteration
   bool unfold = true;             // out of a plane, a line or a point: see penalty::unfold
 
