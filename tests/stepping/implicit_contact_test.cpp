@@ -134,6 +134,21 @@ TEST(ImplicitContact, FollowsAPlaneThatMoves) {
   EXPECT_NEAR(box.lowest(), 0.6, 1e-4);
 }
 
+TEST(ImplicitContact, ABoxThatTumblesNeedsNoSubstepsAndGainsNothing) {
+  BoxOnPlane box({1, 0.6, 0.8}, {4, 3, 3}, 1e5, 0.3);
+  for (int i = 0; i < box.body.particles().size(); ++i)
+    box.body.set_velocity(i, Vector3(3, 0, 1) + Vector3(2, 1, -6).cross(box.body.position(i)));
+  Real last = box.energy();
+  const Real start = last;
+  for (int step = 0; step < 180; ++step) {
+    box.step(frame);
+    EXPECT_EQ(box.body.body.report.substeps, 1) << "step " << step;
+    EXPECT_LT(box.energy(), last + 1e-5 * start) << "step " << step;
+    last = box.energy();
+  }
+  EXPECT_GT(box.lowest(), -1e-4);
+}
+
 TEST(ImplicitContact, TakesDepthBackGently) {
   for (const Real depth : {0.5e-3, 5e-3, 50e-3}) {
     SCOPED_TRACE("depth " + std::to_string(depth));

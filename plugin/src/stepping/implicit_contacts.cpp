@@ -17,10 +17,15 @@ constexpr Real same_normal = 0.9;    // cosine, of a contact that is that of the
 // The remembered contact of the same point that points the same way; null: none.
 const RememberedContact* find(const std::vector<RememberedContact>& memory, const WeightedPoint& point,
                               const Vector3& normal) {
-  const auto same = std::ranges::equal_range(memory, point.particles, {}, &RememberedContact::particles);
-  const auto best =
-      std::ranges::max_element(same, {}, [&](const RememberedContact& known) { return known.normal.dot(normal); });
-  return best != same.end() && best->normal.dot(normal) > same_normal ? &*best : nullptr;
+  const RememberedContact* best = nullptr;
+  Real most = same_normal;
+  for (auto known = std::ranges::lower_bound(memory, point.particles, {}, &RememberedContact::particles);
+       known != memory.end() && known->particles == point.particles; ++known)
+    if (const Real cosine = known->normal.dot(normal); cosine > most) {
+      best = &*known;
+      most = cosine;
+    }
+  return best;
 }
 
 // Of a point at `arm` from the centre, by drifting: on an arc, where velocities lead off it.
