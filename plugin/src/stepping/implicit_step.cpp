@@ -100,19 +100,22 @@ void ImplicitStep::aim() {
     objective.damped_from.resize(4, 0);
 }
 
-// The best of four guesses: free flight, rest, the acceleration of the last step once more, and rigid motion.
+// The best of four guesses: free flight, rest, the acceleration of the last step once more, and rigid motion. In contact
+// the second and third will do, as what flies up to an obstacle goes on as it did.
 void ImplicitStep::choose_start() {
   const Objective& objective = newton_.objective;
   newton_.prepare();
-  newton_.start(objective.targets);
   PackedVectors& guess = state_.guess;
+  const bool flies = !touches_ || !state_.has_acceleration;
+  if (flies) newton_.start(objective.targets);
+  if (state_.has_acceleration) {
+    guess = state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration;
+    flies ? newton_.offer(guess) : newton_.start(guess);
+  }
   guess = state_.from;
   for (const int i : newton_.fixed()) guess.col(i) = objective.targets.col(i);
   newton_.offer(guess);
-  if (state_.has_acceleration) {
-    guess = state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration;
-    newton_.offer(guess);
-  }
+  if (touches_) return;
   if (!is_free()) return;
   const RigidState rigid(particles_);
   const Vector3 turn = duration_ * rigid.angular_velocity(rigid.spin);
