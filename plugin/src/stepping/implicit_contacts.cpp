@@ -187,7 +187,7 @@ void ImplicitContacts::finish(const PackedVectors& x, std::vector<RememberedCont
     row.force = given.force;
     memory.push_back({row.contact->a.point.particles, row.normal, given.force});
   }
-  std::ranges::stable_sort(memory, {}, &RememberedContact::particles);
+  std::ranges::sort(memory, {}, &RememberedContact::particles);
 }
 
 }  // namespace penalty
