@@ -23,12 +23,11 @@ constexpr Real round_off2 = 1e-28;          // square of that of positions, rela
 constexpr Real friction_change = 0.01;                       // of the limits of friction, of their sum, that is left
 constexpr int fewest_between_updates = 4, most_updates = 3;  // iterations, and of the limits
 constexpr int times_iterations = 3;                          // as many as without contact, at most
-constexpr Real kept_stiffness =
-    0.005;  // motion, relative to the distance of particles, that leaves the stiffness as it is
-constexpr int oldest_stiffness = 4;  // iterations that it is kept
-constexpr Real slow_fall = 0.25;     // of the residual in an iteration: then the stiffness is assembled anew
-constexpr Real settled_gap = 1e-3;   // of what presses [m/s]
-constexpr Real sudden = 5;           // approach [speeds gained by gravity in a step] that is an impact
+constexpr Real kept_stiffness = 0.005;  // motion that leaves the stiffness as it is, by the distance of particles
+constexpr int oldest_stiffness = 4;     // iterations that it is kept
+constexpr Real slow_fall = 0.25;        // of the residual in an iteration: then the stiffness is assembled anew
+constexpr Real settled_gap = 1e-3;      // of what presses [m/s]
+constexpr Real sudden = 5;              // approach [speeds gained by gravity in a step] that is an impact
 
 /// One backward Euler step of a body.
 class ImplicitStep {
@@ -40,18 +39,17 @@ class ImplicitStep {
         state_(body_.implicit),
         newton_(state_.newton),
         duration_(duration) {
-    SteppedBody& body = body_;
-    if (!newton_.has_pattern_of(*body.field)) newton_.set_pattern(*body.field);
+    if (!newton_.has_pattern_of(*body_.field)) newton_.set_pattern(*body_.field);
     newton_.clear_fixed();
     for (int i = 0; i < particles_.size(); ++i)
       if (particles_.inverse_masses[i] == 0) newton_.fix(i);
-    newton_.linear = body.options.linear;
+    newton_.linear = body_.options.linear;
     Objective& objective = newton_.objective;
-    objective.field = body.field;
+    objective.field = body_.field;
     objective.weights.resize(particles_.inverse_masses.size());
     for (std::size_t i = 0; i < objective.weights.size(); ++i)
       objective.weights[i] = inverse_or_zero(particles_.inverse_masses[i]) / (duration * duration);
-    objective.damping_time = body.options.damping_time;
+    objective.damping_time = body_.options.damping_time;
     objective.inverse_duration = 1 / duration;
   }
 
@@ -115,8 +113,7 @@ void ImplicitStep::choose_start() {
   guess = state_.from;
   for (const int i : newton_.fixed()) guess.col(i) = objective.targets.col(i);
   newton_.offer(guess);
-  if (touches_) return;
-  if (!is_free()) return;
+  if (touches_ || !is_free()) return;
   const RigidState rigid(particles_);
   const Vector3 turn = duration_ * rigid.angular_velocity(rigid.spin);
   const Real angle = turn.norm();

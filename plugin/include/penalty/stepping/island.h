@@ -156,10 +156,10 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 ///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h + contacts
 ///
 /// by projected Newton iterations with a line search; contacts press and rub by stiff potentials of their own, with
-/// multipliers and limits of friction that are updated in between. Depth is taken back at half a metre a second at most. Unlike that minimum, which turns too slowly, the step keeps the
-/// angular momentum of a free body, and the linear one in spite of iterations that end early: a rigid velocity is
-/// added. Energy that would grow all the same is taken from the velocities that deform the body. StepReport says how
-/// much.
+/// multipliers and limits of friction that are updated in between. Depth is taken back at half a metre a second at most.
+/// Unlike that minimum, which turns too slowly, the step keeps the angular momentum of a free body that touches nothing,
+/// and the linear one in spite of iterations that end early: a rigid velocity is added. Energy that would grow all the
+/// same is taken from the velocities that deform the body. StepReport says how much.
 ///
 /// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off, but for the gyroscopic term
 /// of a rigid body with unequal moments of inertia, which is left to Bullet. A step that cannot be made finite is
