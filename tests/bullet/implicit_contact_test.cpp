@@ -35,7 +35,7 @@ struct Fall {
   Real kinetic() { return kinetic_energy(sim.penalty().particles(body)); }
 };
 
-constexpr Real margin = 0.02;  // of jelly [m]
+constexpr Real jelly_margin = 0.02;  // [m]
 
 TEST_P(ImplicitContactTest, ABodyOfAnyStiffnessFallsAndLiesAtItsMargin) {
   for (const Real stiffness : {1e3, 1e6, 1e10}) {
@@ -49,8 +49,8 @@ TEST_P(ImplicitContactTest, ABodyOfAnyStiffnessFallsAndLiesAtItsMargin) {
       lowest_point = std::min(lowest_point, lowest(fall.body));
       largest = std::max(largest, fall.sim.totals().energy);
     }
-    EXPECT_GT(lowest_point, margin - 1e-3);
-    EXPECT_NEAR(lowest(fall.body), margin, 1e-4);
+    EXPECT_GT(lowest_point, jelly_margin - 1e-3);
+    EXPECT_NEAR(lowest(fall.body), jelly_margin, 1e-4);
     EXPECT_LE(largest, fall.start * (1 + limit(1e-9, 1e-5)));
     EXPECT_LT(fall.kinetic(), 1e-6 * fall.start);
     Real carried = 0;
@@ -65,11 +65,11 @@ TEST_P(ImplicitContactTest, ByItselfAStiffBodyBouncesInSubstepsAndLiesImplicitly
   bool has_touched = false;
   for (int k = 0; k < 300; ++k) {
     fall.sim.step(frame);
-    has_touched = has_touched || lowest(fall.body) < 1.5 * margin;
+    has_touched = has_touched || lowest(fall.body) < 1.5 * jelly_margin;
     if (has_touched) highest = std::max(highest, lowest(fall.body));
   }
   EXPECT_GT(highest, 0.05);
-  EXPECT_NEAR(lowest(fall.body), margin, 1e-3);
+  EXPECT_NEAR(lowest(fall.body), jelly_margin, 1e-3);
   EXPECT_EQ(fall.report().integrator, Integrator::implicit_step);
   EXPECT_LT(fall.kinetic(), 1e-6 * fall.start);
 }

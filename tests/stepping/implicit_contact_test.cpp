@@ -7,7 +7,7 @@
 namespace penalty::testing {
 namespace {
 
-constexpr Real mass = 8;  // of the bodies below [kg]
+constexpr Real box_mass = 8;  // [kg]
 
 /// A box of cells on or above the plane through the origin, along +y, with gravity turned by `slope` towards +x.
 struct BoxOnPlane {
@@ -22,7 +22,7 @@ struct BoxOnPlane {
     const TetMesh mesh = make_box(size, cells);
     const auto count = static_cast<std::size_t>(mesh.vertices.cols());
     body = make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, stiffness),
-                     std::vector<Real>(count, static_cast<Real>(count) / mass));
+                     std::vector<Real>(count, static_cast<Real>(count) / box_mass));
     body.particles().positions.row(1).array() += height - body.particles().positions.row(1).minCoeff();
     body.body.positions_changed();
     body.body.gravity = gravity;
@@ -86,7 +86,7 @@ TEST(ImplicitContact, WhateverTheStiffnessABodyIsDroppedOnAPlaneWithoutGainAndCo
                      std::to_string(stiffness));
         BoxOnPlane box({1, 1, 1}, {3, 3, 3}, stiffness, 1);
         box.body.body.options.damping_time = damping_time;
-        const Real start = box.energy(), fall = mass * g;
+        const Real start = box.energy(), fall = box_mass * g;
         Real largest = start, deepest = 0;
         for (int step = 0; step < static_cast<int>(4 * rate); ++step) {
           box.step(1 / rate);
@@ -98,7 +98,7 @@ TEST(ImplicitContact, WhateverTheStiffnessABodyIsDroppedOnAPlaneWithoutGainAndCo
         EXPECT_LE(largest, start + 1e-6 * fall);
         EXPECT_LT(deepest, 1e-3);
         EXPECT_LT(kinetic_energy(box.body.particles()), 1e-4 * fall);
-        EXPECT_NEAR(box.impulse().y(), mass * g / rate, 1e-3 * mass * g / rate);
+        EXPECT_NEAR(box.impulse().y(), box_mass * g / rate, 1e-3 * box_mass * g / rate);
       }
 }
 
@@ -107,7 +107,7 @@ TEST(ImplicitContact, OnASlopeABodyRestsAndIsCarriedByItsWeight) {
   BoxOnPlane box({1, 0.5, 1}, {6, 3, 6}, 1e3, 0, std::numbers::pi / 12);
   for (int step = 0; step < 300; ++step) box.step(frame);
   EXPECT_LT(box.fastest(), 2e-5);
-  EXPECT_LT((box.impulse() + frame * mass * box.gravity).norm(), 1e-5 * frame * mass * g);
+  EXPECT_LT((box.impulse() + frame * box_mass * box.gravity).norm(), 1e-5 * frame * box_mass * g);
 }
 
 TEST(ImplicitContact, WhatContactsGiveIsWhatTheMomentaOfTheBodyChangeBy) {
@@ -119,7 +119,7 @@ TEST(ImplicitContact, WhatContactsGiveIsWhatTheMomentaOfTheBodyChangeBy) {
     const Momentum before = momentum({&box.body});
     box.step(frame);
     const Vector3 change = momentum({&box.body}).linear - before.linear;
-    error.see((change - frame * mass * box.gravity - box.impulse()).norm(), step);
+    error.see((change - frame * box_mass * box.gravity - box.impulse()).norm(), step);
   }
   error.expect_below(1e-10, "momentum");
 }
