@@ -1,4 +1,4 @@
-// Stiff bodies on what cannot move, stepped implicitly.
+// Stiff bodies in contact, stepped implicitly.
 #include <algorithm>
 #include <cmath>
 
@@ -95,6 +95,30 @@ TEST_P(ImplicitContactTest, AStiffBodyRidesOnATurntable) {
   }
   const Vector3 carried = Eigen::AngleAxis<Real>(angle, Vector3::UnitY()) * before;
   EXPECT_LT((center_of_mass(sim.penalty().particles(body)) - carried).norm(), 0.01 * carried.norm());
+}
+
+TEST_P(ImplicitContactTest, ASlabOfAnyMassComesToRestOnARingOfAnyStiffness) {
+  for (const Real mass : {0.1, 10.0, 1000.0})
+    for (const Real stiffness : {1e5, 1e8}) {
+      SCOPED_TRACE("mass " + std::to_string(mass) + ", stiffness " + std::to_string(stiffness));
+      Fall fall(GetParam(), stiffness, 0.03, Integrator::implicit_step);
+      const btRigidBody& slab = fall.sim.add_box({1.5, 0.1, 1.5}, mass, {0.02, 1.2, -0.01});  // its edges far away
+      const Real start = fall.sim.totals().energy;
+      Real largest = start;
+      for (int k = 0; k < 240; ++k) {
+        fall.sim.step(frame);
+        ASSERT_TRUE(fall.report().finite);
+        ASSERT_EQ(fall.report().integrator, Integrator::implicit_step) << "frame " << k;
+        largest = std::max(largest, fall.sim.totals().energy);
+      }
+      EXPECT_LE(largest, start * (1 + limit(1e-9, 1e-5)));
+      EXPECT_LT(slab.getLinearVelocity().length(), 5e-3);
+      EXPECT_NEAR(slab.getWorldTransform().getOrigin().y(), 0.03 + 0.6 + 0.1, 0.02);
+      EXPECT_NEAR(lowest(fall.body), jelly_margin, 1e-3);
+      Real carried = 0;
+      for (const BodyContact& contact : fall.sim.penalty().contacts(fall.body)) carried += contact.impulse.y() / frame;
+      EXPECT_NEAR(carried, fall.weight(), 0.01 * (fall.weight() + mass * g)) << "the ground's less the slab's";
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(World, ImplicitContactTest, both_worlds(), param_name);

@@ -165,12 +165,5 @@ TEST(ImplicitContact, TakesDepthBackGently) {
   }
 }
 
-TEST(ImplicitContact, LeavesWhatTouchesABodyThatCanMoveToTheSubsteps) {
-  BoxOnPlane box({1, 1, 1}, {3, 3, 3}, 1e4, 0);
-  box.plane() = make_sphere(10, 0.3, {0, -1, 0});
-  box.step(frame);
-  EXPECT_EQ(box.body.body.report.integrator, Integrator::explicit_step);
-}
-
 }  // namespace
 }  // namespace penalty::testing

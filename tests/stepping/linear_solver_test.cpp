@@ -30,8 +30,49 @@ struct Problem {
     system.matrix.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(x.cols(), 1));
   }
 
+  // Two rigid bodies, one between the particles and the other, and contacts of this stiffness.
+  void add_rigid_bodies(unsigned seed, Real stiffness) {
+    Random random(seed);
+    const auto positive = [&random] {
+      const Matrix3 m = random.vectors<3>(3, 1);
+      return Matrix3(m * m.transpose() + Matrix3::Identity());
+    };
+    const int first = static_cast<int>(x.cols()), second = first + 2;
+    system.rigid_bodies = {{positive(), positive()}, {positive(), positive()}};
+    b = random_packed(second + 2, 1, random);
+    for (int k = 0; k < 6; ++k) {
+      ContactSides sides;
+      sides.rigid[0] = {.column = k % 2 == 0 ? first : second, .sign = -1, .arm = random.vectors<1>(1, 1)};
+      sides.num_rigid = 1;
+      if (k < 4)
+        sides.point = {{k, k + 7, k + 12}, {0.5, 0.3, 0.2}, 3};
+      else
+        sides.rigid[sides.num_rigid++] = {.column = k % 2 == 0 ? second : first, .sign = 1, .arm = {0.3, -1, 0.2}};
+      system.contacts.push_back({sides, stiffness * positive()});
+    }
+  }
+
   Eigen::MatrixXd dense() const {
-    Eigen::MatrixXd a = system.matrix.to_dense();
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(3 * system.num_columns(), 3 * system.num_columns());
+    a.topLeftCorner(3 * x.cols(), 3 * x.cols()) = system.matrix.to_dense();
+    Eigen::Index row = 3 * x.cols();
+    for (const auto& [translation, rotation] : system.rigid_bodies) {
+      a.block<3, 3>(row, row) = translation;
+      a.block<3, 3>(row + 3, row + 3) = rotation;
+      row += 6;
+    }
+    for (const auto& [sides, stiffness] : system.contacts) {
+      Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(3, a.cols());
+      for (int k = 0; k < sides.point.size; ++k)
+        jacobian.middleCols<3>(3 * sides.point.particles[k]).diagonal().setConstant(sides.point.weights[k]);
+      for (int k = 0; k < sides.num_rigid; ++k) {
+        const auto& [column, sign, arm] = sides.rigid[k];
+        jacobian.middleCols<3>(3 * column).diagonal().setConstant(sign);
+        for (int axis = 0; axis < 3; ++axis)
+          jacobian.col(3 * column + 3 + axis) = sign * Vector3::Unit(axis).cross(arm);
+      }
+      a += jacobian.transpose() * stiffness * jacobian;
+    }
     for (const int i : system.fixed) {
       a.middleRows<3>(3 * i).setZero();
       a.middleCols<3>(3 * i).setZero();
@@ -44,14 +85,14 @@ struct Problem {
     PackedVectors right = b;
     system.clear_fixed(right);
     const Eigen::VectorXd solution = dense().ldlt().solve(Eigen::VectorXd(right.topRows<3>().reshaped()));
-    return pack(solution.reshaped(3, x.cols()));
+    return pack(solution.reshaped(3, b.cols()));
   }
 
   PackedVectors solved(int* iterations = nullptr, const LinearOptions& options = {2000, 1e-12}) const {
     LinearSolver solver;
     solver.set_pattern(system.matrix.blocks());
     solver.factorize(system, x);
-    PackedVectors y(4, x.cols());
+    PackedVectors y;
     const int used = solver.solve(system, b, options, y).iterations;
     if (iterations) *iterations = used;
     return y;
@@ -74,6 +115,18 @@ TEST(LinearSolver, SolvesWhatADenseFactorisationSolves) {
   plain.expect_below(1e-8, "free");
   fixed.expect_below(1e-8, "some fixed");
   terms.expect_below(1e-8, "dense terms");
+}
+
+TEST(LinearSolver, SolvesWithRigidBodiesAndContactsHoweverHard) {
+  WorstError error;
+  for (unsigned seed = 0; seed < 10; ++seed)
+    for (const Real stiffness : {1e-2, 1e2, 1e6}) {
+      Problem problem(seed);
+      problem.system.fixed = {0, 5, 17};
+      problem.add_rigid_bodies(seed, stiffness);
+      error.see(relative_error(problem.solved(), problem.exact()), seed);
+    }
+  error.expect_below(1e-6, "solution");
 }
 
 TEST(LinearSolver, LeadsDownhillHoweverEarlyItStops) {

@@ -3,15 +3,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 #include "contact_rules.h"
 #include "particle_contacts.h"
+#include "rigid_contacts.h"
 #include "stepped_body.h"
 
 namespace penalty {
 namespace {
 
 constexpr Real hardness_share = 30;  // of the inertia and stiffness that a contact works against
+constexpr Real hardening = 4;        // of a contact whose multiplier leaves
+constexpr Real enough_less = 0.25;   // more than this of the gap that it began with
 constexpr Real same_normal = 0.9;    // cosine, of a contact that is that of the last step
 
 // The remembered contact of the same point that points the same way; null: none.
@@ -28,48 +33,84 @@ const RememberedContact* find(const std::vector<RememberedContact>& memory, cons
   return best;
 }
 
-// Of a point at `arm` from the centre, by drifting: on an arc, where velocities lead off it.
-Vector3 way_of(const RigidBody& rigid, const Vector3& arm, Real duration) {
-  const Vector3 turn = duration * rigid.angular_velocity;
-  const Real angle = turn.norm();
-  Vector3 way = duration * rigid.velocity;
-  if (angle > 0) way += Eigen::AngleAxis<Real>(angle, turn / angle) * arm - arm;
-  return way;
+Real mobility_of(const RigidBody* body, const Vector3& arm, const Vector3& direction) {
+  return body && body->is_dynamic() ? direction.dot(body->mobility_at(arm) * direction) : 0;
 }
 
 }  // namespace
 
 ImplicitContacts::ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, Real duration)
-    : body_(*island.bodies.front()), duration_(duration) {
-  const Particles& particles = body_.particles;
-  rows_.reserve(island.contacts.size());
+    : island_(island), body_(*island.bodies.front()), duration_(duration) {
+  rows_.reserve(island.contacts.size() + island.rigid_contacts.size());
   for (Contact& contact : island.contacts) {
-    if (!(contact.a.point.mobility(particles.inverse_masses) > 0)) continue;
     const ContactPlace place = place_of(contact, island);
-    const RigidBody& rigid = island.rigid_bodies[contact.b.rigid];
-    Row& row = rows_.emplace_back();
-    row.contact = &contact;
+    Row row{.contact = &contact, .b = &island.rigid_bodies[contact.b.rigid]};
+    row.arm_b = place.at - row.b->position;
+    row.sides.point = contact.a.point;
     row.normal = place.normal;
     row.start = place.at;
-    row.way = way_of(rigid, place.at - rigid.position, duration);
-    row.depth = std::max<Real>(-place.gap, 0);
-    // Depth comes back no faster than is good, and what is too deep stays.
-    const Real recovered = row.depth <= contact.deepest ? recovery_speed * duration : 0;
-    row.gap = place.gap + std::max<Real>(row.depth - recovered, 0);
     row.friction = contact.friction;
-    if (const RememberedContact* known = find(memory, contact.a.point, row.normal)) {
-      row.pressing = std::max<Real>(row.normal.dot(known->force), 0);
-      row.limit = row.friction * row.pressing;
-      row.rubbing = no_longer_than(row.limit, known->force - row.normal.dot(known->force) * row.normal);
-      row.is_new = false;
-    }
+    if (const RememberedContact* known = find(memory, contact.a.point, row.normal)) start(row, known->force);
+    add(row, place.gap, contact.deepest, contact.radius == 0);
   }
+  for (RigidContact& contact : island.rigid_contacts) {
+    const RigidContactPlace place = place_of(contact, island);
+    Row row{.rigid = &contact, .a = &island.rigid_bodies[contact.a], .b = &island.rigid_bodies[contact.b]};
+    row.arm_a = place.at - row.a->position;
+    row.arm_b = place.at - row.b->position;
+    row.normal = place.normal;
+    row.friction = contact.friction;
+    if (!contact.force.isZero(0)) start(row, contact.force);
+    add(row, place.gap, std::numeric_limits<Real>::infinity(), contact.radius == 0);
+  }
+}
+
+// From what it gave in the last step [N].
+void ImplicitContacts::start(Row& row, const Vector3& force) {
+  row.pressing = std::max<Real>(row.normal.dot(force), 0);
+  row.limit = row.friction * row.pressing;
+  row.rubbing = no_longer_than(row.limit, force - row.normal.dot(force) * row.normal);
+  row.is_new = false;
+}
+
+// With what is left of it: the rigid bodies.
+void ImplicitContacts::add(Row row, Real gap, Real deepest, bool bends) {
+  bool moves = row.sides.point.size > 0 && row.sides.point.mobility(body_.particles.inverse_masses) > 0;
+  int column = body_.particles.size();
+  for (RigidBody& body : island_.rigid_bodies) {
+    for (const auto& [side, arm, sign] : {std::tuple(row.a, row.arm_a, 1), std::tuple(row.b, row.arm_b, -1)}) {
+      if (side != &body) continue;
+      const Vector3 way = -sign * way_of(body, arm, bends);
+      row.way += way;
+      if (body.is_dynamic())
+        row.sides.rigid[row.sides.num_rigid++] = {.column = column, .sign = Real(sign), .arm = arm};
+      else
+        row.driven += way;
+      moves = moves || body.is_dynamic();
+    }
+    if (body.is_dynamic()) column += 2;
+  }
+  if (!moves) return;
+  // Depth comes back no faster than is good, and what is too deep stays.
+  const Real depth = std::max<Real>(-gap, 0), recovered = depth <= deepest ? recovery_speed * duration_ : 0;
+  row.gap = gap + std::max<Real>(depth - recovered, 0);
+  rows_.push_back(row);
+}
+
+// Of a point at `arm` from the centre of a body: of one that takes no impulse, by drifting; of another what is beyond the
+// linear part, as it turns now. `bends`: it goes on an arc, where velocities lead off it.
+Vector3 ImplicitContacts::way_of(const RigidBody& body, const Vector3& arm, bool bends) const {
+  const Vector3 turn = duration_ * body.angular_velocity;
+  Vector3 way = body.is_dynamic() ? Vector3::Zero() : Vector3(duration_ * body.velocity_at(arm));
+  if (const Real angle = turn.norm(); bends && angle > 0)
+    way += Eigen::AngleAxis<Real>(angle, turn / angle) * arm - arm - turn.cross(arm);
+  return way;
 }
 
 // Points that share particles, as those of an embedded surface do, share what these give way by.
 void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
   const auto visit_free = [this](const Row& row, const auto& visit) {
-    const WeightedPoint& point = row.contact->a.point;
+    const WeightedPoint& point = row.sides.point;
     for (int k = 0; k < point.size; ++k)
       if (body_.particles.inverse_masses[point.particles[k]] > 0)
         visit(point.particles[k], point.weights[k] * point.weights[k]);
@@ -78,7 +119,9 @@ void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
   for (const Row& row : rows_) visit_free(row, [this](int particle, Real weight2) { shares_[particle] += weight2; });
   const bool is_free = newton.fixed().empty();
   for (Row& row : rows_) {
-    Real softness = is_free ? duration_ * duration_ / body_.mass : 0;
+    Real mobility = mobility_of(row.a, row.arm_a, row.normal) + mobility_of(row.b, row.arm_b, row.normal);
+    if (row.contact && is_free) mobility += 1 / body_.mass;
+    Real softness = duration_ * duration_ * mobility;
     visit_free(row, [&](int particle, Real weight2) {
       softness += 3 * weight2 * std::max<Real>(shares_[particle], 1) / newton.stiffness_of(particle).trace();
     });
@@ -86,22 +129,20 @@ void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
   }
 }
 
-void ImplicitContacts::predict(const PackedVectors& velocities, const PackedVectors& targets, Real negligible_speed) {
+void ImplicitContacts::predict(const PackedVectors& targets, Real negligible_speed) {
   for (Row& row : rows_) {
-    const WeightedPoint& point = row.contact->a.point;
-    const Real approach = -row.normal.dot(point.of(velocities) - row.way / duration_);
-    row.is_predicted = row.is_new && approach > negligible_speed && gap_of(row, point.of(targets)) < 0;
+    const Vector3 way = moved(row, targets);
+    row.is_predicted = row.is_new && -row.normal.dot(way) > negligible_speed * duration_ && gap_of(row, way) < 0;
   }
 }
 
-ImplicitContacts::Force ImplicitContacts::force_of(const Row& row, const Vector3& point) const {
+ImplicitContacts::Force ImplicitContacts::force_of(const Row& row, const Vector3& moved) const {
   Force result{Vector3::Zero(), 0, 0, 0};
-  result.pressing = std::max<Real>(row.pressing - row.hardness * gap_of(row, point), 0);
+  result.pressing = std::max<Real>(row.pressing - row.hardness * gap_of(row, moved), 0);
   result.force = result.pressing * row.normal;
   result.energy = (result.pressing * result.pressing - row.pressing * row.pressing) / (2 * row.hardness);
   if (!(row.limit > 0)) return result;
-  Vector3 slip = point - row.start - row.way;
-  slip -= row.normal.dot(slip) * row.normal;
+  const Vector3 slip = moved - row.normal.dot(moved) * row.normal;
   const Vector3 wanted = row.rubbing - row.hardness * slip;
   const Real size = wanted.norm();
   result.rubbing_share = size > row.limit ? row.limit / size : 1;
@@ -114,11 +155,9 @@ ImplicitContacts::Force ImplicitContacts::force_of(const Row& row, const Vector3
 Real ImplicitContacts::evaluate(const PackedVectors& x, PackedVectors& gradient) const {
   Real energy = 0;
   for (const Row& row : rows_) {
-    const WeightedPoint& point = row.contact->a.point;
-    const Force given = force_of(row, point.of(x));
+    const Force given = force_of(row, moved(row, x));
     energy += given.energy;
-    if (given.force.isZero(0)) continue;
-    for (int k = 0; k < point.size; ++k) gradient.col(point.particles[k]).head<3>() -= point.weights[k] * given.force;
+    if (!given.force.isZero(0)) row.sides.add(-given.force, gradient);
   }
   return energy;
 }
@@ -126,27 +165,26 @@ Real ImplicitContacts::evaluate(const PackedVectors& x, PackedVectors& gradient)
 void ImplicitContacts::linearize(const PackedVectors& x, std::vector<ContactStiffness>& stiffness,
                                  PackedVectors& forces) {
   for (Row& row : rows_) {
-    const WeightedPoint& point = row.contact->a.point;
-    const Vector3 at = point.of(x);
-    const Force given = force_of(row, at);
+    const Vector3 way = moved(row, x);
+    const Force given = force_of(row, way);
     row.force = given.force;
     const Matrix3 along = row.normal * row.normal.transpose();
     Real pressed = given.pressing > 0 ? row.hardness : 0;
     if (row.is_predicted && pressed == 0) {
-      const Vector3 pull = (row.pressing - row.hardness * gap_of(row, at)) * row.normal;
-      for (int k = 0; k < point.size; ++k) forces.col(point.particles[k]).head<3>() += point.weights[k] * pull;
+      const Vector3 pull = (row.pressing - row.hardness * gap_of(row, way)) * row.normal;
+      row.sides.add(pull, forces);
       row.force += pull;
       pressed = row.hardness;
     }
     row.is_predicted = false;
     row.stiffness = pressed * along + row.hardness * given.rubbing_share * (Matrix3::Identity() - along);
-    if (pressed > 0 || given.rubbing_share > 0) stiffness.push_back({point, row.stiffness});
+    if (pressed > 0 || given.rubbing_share > 0) stiffness.push_back({row.sides, row.stiffness});
   }
 }
 
 void ImplicitContacts::follow(Real length, const PackedVectors& direction) {
   for (Row& row : rows_)
-    row.linear_pressing = row.normal.dot(row.force - length * (row.stiffness * row.contact->a.point.of(direction)));
+    row.linear_pressing = row.normal.dot(row.force - length * (row.stiffness * row.sides.distance(direction)));
 }
 
 ImplicitContacts::Change ImplicitContacts::limit_change(const PackedVectors& x) const {
@@ -155,17 +193,21 @@ ImplicitContacts::Change ImplicitContacts::limit_change(const PackedVectors& x) 
     const Real limit = row.friction * std::max<Real>(row.linear_pressing, 0);
     change.limits += std::abs(limit - row.limit);
     change.sum += limit;
-    const Vector3 at = row.contact->a.point.of(x);
-    if (force_of(row, at).pressing > 0) change.gap = std::max(change.gap, std::abs(gap_of(row, at)));
+    const Vector3 way = moved(row, x);
+    if (force_of(row, way).pressing > 0) change.gap = std::max(change.gap, std::abs(gap_of(row, way)));
   }
   return change;
 }
 
-void ImplicitContacts::update(const PackedVectors& x, bool converged) {
+void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settled_gap) {
   for (Row& row : rows_) {
-    const Force given = force_of(row, row.contact->a.point.of(x));
+    const Vector3 way = moved(row, x);
+    const Force given = force_of(row, way);
     row.limit = row.friction * std::max<Real>(row.linear_pressing, 0);
     if (!converged) continue;
+    const Real gap = given.pressing > 0 ? std::abs(gap_of(row, way)) : 0;
+    if (gap > settled_gap && gap > enough_less * row.last_gap) row.hardness *= hardening;
+    row.last_gap = gap;
     row.pressing = given.pressing;
     row.rubbing = no_longer_than(row.limit, given.force - given.pressing * row.normal);
   }
@@ -173,19 +215,25 @@ void ImplicitContacts::update(const PackedVectors& x, bool converged) {
 
 void ImplicitContacts::finish(const PackedVectors& x, std::vector<RememberedContact>& memory) {
   memory.clear();
-  for (Row& row : rows_) {
-    const Vector3 at = row.contact->a.point.of(x);
-    const Force given = force_of(row, at);
+  for (const Row& row : rows_) {
+    const Vector3 way = moved(row, x);
+    const Force given = force_of(row, way);
+    if (row.rigid) row.rigid->force = given.force;
     if (given.force.isZero(0)) continue;
-    const Vector3 moved = at - row.start, rubbed = given.force - given.pressing * row.normal;
-    work_ += given.force.dot(moved);
+    const Vector3 impulse = duration_ * given.force;
+    touch_immovable_ = touch_immovable_ || !row.b->is_dynamic() || (row.a && !row.a->is_dynamic());
     // What a contact does against its obstacle is loss; the other way, depth comes back, or its multipliers were too much.
-    outside_work_ += given.force.dot(row.way) + std::max<Real>(given.force.dot(moved - row.way), 0);
-    impulse_ += duration_ * given.force;
+    outside_work_ += given.force.dot(row.driven) + std::max<Real>(given.force.dot(way), 0);
+    if (row.a && row.a->is_dynamic()) row.a->give(impulse, row.arm_a.cross(impulse));
+    if (row.b->is_dynamic()) row.b->give(-impulse, -row.arm_b.cross(impulse));
+    if (!row.contact) continue;
+    const Vector3 rubbed = given.force - given.pressing * row.normal;
+    work_ += given.force.dot(row.sides.point.of(x) - row.start);
+    impulse_ += impulse;
+    moment_ += row.start.cross(impulse);
     row.contact->given.add(row.normal, duration_ * given.pressing, duration_ * rubbed,
                            is_at_limit(rubbed.norm(), row.friction * given.pressing));
-    row.force = given.force;
-    memory.push_back({row.contact->a.point.particles, row.normal, given.force});
+    memory.push_back({row.sides.point.particles, row.normal, given.force});
   }
   std::ranges::sort(memory, {}, &RememberedContact::particles);
 }

@@ -1,5 +1,6 @@
 // Contacts in the minimisation of an implicit step.
 #pragma once
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,19 +9,20 @@
 
 namespace penalty {
 
-/// Contacts of one body with what takes no impulse, as a potential over a step of h. The gap is taken linear in the
-/// positions, with the normal of where the step begins,
+/// Contacts of one soft body with rigid ones, and of these with each other, as a potential over a step of h. The gap is taken
+/// linear in the unknowns, with the normal of where the step begins,
 ///
 ///     g(x) = g0 + n . (J (x - x0) - u),   s(x) = (1 - n nᵀ) (J (x - x0) - u),
 ///
-/// u the way of the obstacle there in the step, and pressed by f = max(0, l - rho g), rubbed by -rho s, shortened to a limit that
-/// is held while Newton's method iterates: an energy with a continuous derivative, convex. The limit is what the linear
-/// model of the last iteration presses, times the coefficient of friction; its stiffness at the limit is a secant, which
-/// is never less than the energy's. The multipliers l, of which the friction has its own, begin with what the contact gave
-/// in the last step, and end as what it gives in this one: what lies neither sinks nor creeps.
+/// J as in ContactSides, u the way in the step, there, of what takes no impulse. The contact is pressed by
+/// f = max(0, l - rho g), and rubbed by -rho s, shortened to a limit that is held while Newton's method iterates: an energy
+/// with a continuous derivative, convex. The limit is what the linear model of the last iteration presses, times the
+/// coefficient of friction; its stiffness at the limit is a secant, which is never less than the energy's. The multipliers
+/// l, of which the friction has its own, begin with what the contact gave in the last step, and end as what it gives in
+/// this one: what lies neither sinks nor creeps.
 ///
-/// rho is `hardness` times the inertia and stiffness that the contact works against, of the particles and of the body as
-/// a whole: more would be met by no motion of the body.
+/// rho is `hardness` times the inertia and stiffness that the contact works against, of the particles and of each body as
+/// a whole: more would be met by no motion of the bodies.
 class ImplicitContacts {
  public:
   ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, Real duration);
@@ -30,9 +32,9 @@ class ImplicitContacts {
   /// Sets rho, from the diagonal blocks of the stiffness, inertia included.
   void set_hardness(const NewtonSolver& newton);
 
-  /// Marks what the body meets in this step for the first time at `velocities`, and would pass on its way to `targets`:
-  /// the first direction of Newton's method then ends at the obstacle, not beyond it.
-  void predict(const PackedVectors& velocities, const PackedVectors& targets, Real negligible_speed);
+  /// Marks what is met in this step for the first time, faster than `negligible_speed`, and would be passed on the way to
+  /// `targets`: the first direction of Newton's method then ends at the obstacle, not beyond it.
+  void predict(const PackedVectors& targets, Real negligible_speed);
 
   /// Returns the energy [J] and adds its gradient [N].
   Real evaluate(const PackedVectors& x, PackedVectors& gradient) const;
@@ -49,28 +51,41 @@ class ImplicitContacts {
   };
   Change limit_change(const PackedVectors& x) const;
 
-  /// Takes the limits anew, and, if `converged`, the multipliers.
-  void update(const PackedVectors& x, bool converged);
+  /// Takes the limits anew, and, if `converged`, the multipliers. Where these have left a gap that is neither settled nor
+  /// much less than before, rho grows: what is pressed on a light body by a heavy one has that one's inertia, too.
+  void update(const PackedVectors& x, bool converged, Real settled_gap);
 
-  /// Books what contacts gave until the positions `x`, and remembers it.
+  /// Books what contacts gave until the positions `x`, gives it to rigid bodies, and remembers it.
   void finish(const PackedVectors& x, std::vector<RememberedContact>& memory);
 
-  Vector3 impulse() const { return impulse_; }         // on the body [N s]
-  Real work() const { return work_; }                  // on the body [J],
-  Real outside_work() const { return outside_work_; }  // and of what moves, and of taking depth back
+  /// Whether what takes no impulse has given any.
+  bool touch_immovable() const { return touch_immovable_; }
+
+  /// On the soft body: impulse [N s], its moment about the point `center`, where particles were at the start [N m s],
+  /// and work [J].
+  Vector3 impulse() const { return impulse_; }
+  Vector3 moment(const Vector3& center) const { return moment_ - center.cross(impulse_); }
+  Real work() const { return work_; }
+  Real outside_work() const { return outside_work_; }  // of what moves and takes no impulse, of taking depth back [J]
 
  private:
   struct Row {
-    Contact* contact = nullptr;
+    Contact* contact = nullptr;            // of the soft body; else
+    RigidContact* rigid = nullptr;         // between rigid ones
+    RigidBody *a = nullptr, *b = nullptr;  // rigid bodies of the sides; null: none
+    Vector3 arm_a = Vector3::Zero(), arm_b = Vector3::Zero();
+    ContactSides sides = {};
     Vector3 normal = Vector3::Zero();
-    Vector3 start = Vector3::Zero();  // J x0
-    Vector3 way = Vector3::Zero();    // u
-    Real gap = 0, depth = 0;          // g0; what was lost when the step began [m]
+    Vector3 start = Vector3::Zero();   // J x0
+    Vector3 way = Vector3::Zero();     // u
+    Vector3 driven = Vector3::Zero();  // of that, what something outside does the work of
+    Real gap = 0;                      // g0
     Real hardness = 0, friction = 0, limit = 0;
-    Real pressing = 0;                    // l
-    Vector3 rubbing = Vector3::Zero();    // its part across the normal
-    Vector3 force = Vector3::Zero();      // of the last linearisation
-    Matrix3 stiffness = Matrix3::Zero();  // likewise
+    Real last_gap = std::numeric_limits<Real>::infinity();  // when multipliers were taken [m]
+    Real pressing = 0;                                      // l
+    Vector3 rubbing = Vector3::Zero();                      // its part across the normal
+    Vector3 force = Vector3::Zero();                        // of the last linearisation
+    Matrix3 stiffness = Matrix3::Zero();                    // likewise
     Real linear_pressing = 0;
     bool is_new = true, is_predicted = false;
   };
@@ -80,17 +95,21 @@ class ImplicitContacts {
     Real pressing;
     Real rubbing_share;  // of what friction would be without its limit
   };
-  Force force_of(const Row& row, const Vector3& point) const;
-  Real gap_of(const Row& row, const Vector3& point) const {
-    return row.gap + row.normal.dot(point - row.start - row.way);
-  }
+  void add(Row row, Real gap, Real deepest, bool bends);
+  void start(Row& row, const Vector3& force);
+  Vector3 way_of(const RigidBody& body, const Vector3& arm, bool bends) const;
+  Vector3 moved(const Row& row, const PackedVectors& x) const { return row.sides.distance(x) - row.start - row.way; }
+  Force force_of(const Row& row, const Vector3& moved) const;
+  static Real gap_of(const Row& row, const Vector3& moved) { return row.gap + row.normal.dot(moved); }
 
+  Island& island_;
   const SteppedBody& body_;
   Real duration_;
   std::vector<Row> rows_;
   std::vector<Real> shares_;  // of each particle: sum of squared weights in all points
-  Vector3 impulse_ = Vector3::Zero();
+  Vector3 impulse_ = Vector3::Zero(), moment_ = Vector3::Zero();
   Real work_ = 0, outside_work_ = 0;
+  bool touch_immovable_ = false;
 };
 
 }  // namespace penalty

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "energy_guard.h"
 #include "implicit_contacts.h"
 #include "particle_contacts.h"
 #include "restitution.h"
+#include "rigid_contacts.h"
 #include "rigid_state.h"
 #include "stepped_body.h"
 #include "surface_contacts.h"
@@ -21,15 +23,16 @@ constexpr Real round_off2 = 1e-28;          // square of that of positions, rela
 
 // In contact:
 constexpr Real friction_change = 0.01;                       // of the limits of friction, of their sum, that is left
-constexpr int fewest_between_updates = 4, most_updates = 3;  // iterations, and of the limits
+constexpr int fewest_between_updates = 4, most_updates = 6;  // iterations, and of the limits
 constexpr int times_iterations = 3;                          // as many as without contact, at most
 constexpr Real kept_stiffness = 0.005;  // motion that leaves the stiffness as it is, by the distance of particles
 constexpr int oldest_stiffness = 4;     // iterations that it is kept
-constexpr Real slow_fall = 0.25;        // of the residual in an iteration: then the stiffness is assembled anew
-constexpr Real settled_gap = 1e-3;      // of what presses [m/s]
+constexpr Real slow_fall = 0.25;        // of the residual in an iteration: then the stiffness is assembled anew,
+constexpr Real still_slow = 2;          // unless it fell hardly faster when it was new
+constexpr Real settled_gap = 1e-4;      // of what presses [m/s]
 constexpr Real sudden = 5;              // approach [speeds gained by gravity in a step] that is an impact
 
-/// One backward Euler step of a body.
+/// One backward Euler step of a soft body and the rigid ones that it touches.
 class ImplicitStep {
  public:
   ImplicitStep(Island& island, Real duration)
@@ -55,7 +58,7 @@ class ImplicitStep {
 
   void run();
 
-  /// Of obstacles that move, and of taking depth back, so far [J].
+  /// Of obstacles that move, of taking depth back, and of what turns a rigid body's axes, so far [J].
   Real outside_work() const { return outside_work_; }
 
   /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned
@@ -64,10 +67,15 @@ class ImplicitStep {
 
  private:
   void aim();
+  void aim_rigid_bodies();
+  template <class Derived>
+  const PackedVectors& guess(const Eigen::MatrixBase<Derived>& positions, bool rigid_bodies_move);
   void choose_start();
   Real noise() const;
+  Real kinetic_scale() const;
   void minimize();
   void minimize_in_contact(ImplicitContacts& contacts);
+  void drift_rigid_bodies();
   void restore_momenta(const RigidState& before, const ImplicitContacts& contacts);
   bool is_free() const { return newton_.fixed().empty(); }
   Real stiffness_range() const { return kept_stiffness * body_.size / std::cbrt(static_cast<Real>(particles_.size())); }
@@ -84,7 +92,8 @@ class ImplicitStep {
 // Where the particles would be without elastic forces; pinned ones go where their velocity takes them.
 void ImplicitStep::aim() {
   Objective& objective = newton_.objective;
-  objective.targets = state_.from + duration_ * particles_.velocities;
+  aim_rigid_bodies();
+  objective.targets.leftCols(particles_.size()) = state_.from + duration_ * particles_.velocities;
   for (int i = 0; i < particles_.size(); ++i) {
     const Real inverse_mass = particles_.inverse_masses[i];
     if (!(inverse_mass > 0)) continue;
@@ -98,21 +107,54 @@ void ImplicitStep::aim() {
     objective.damped_from.resize(4, 0);
 }
 
+void ImplicitStep::aim_rigid_bodies() {
+  Objective& objective = newton_.objective;
+  const Real rate2 = 1 / (duration_ * duration_);
+  objective.rigid_bodies.clear();
+  for (const RigidBody& rigid : island_.rigid_bodies)
+    if (rigid.is_dynamic())
+      objective.rigid_bodies.push_back(
+          {.translation = rate2 * rigid.inverse_mass.cwiseInverse().asDiagonal().toDenseMatrix(),
+           .rotation = rate2 * rigid.inverse_inertia.inverse()});
+  Eigen::Index column = particles_.size();
+  objective.targets.resize(4, column + 2 * static_cast<Eigen::Index>(objective.rigid_bodies.size()));
+  for (const RigidBody& rigid : island_.rigid_bodies)
+    if (rigid.is_dynamic()) {
+      objective.targets.col(column++) << duration_ * (rigid.velocity + duration_ * rigid.acceleration), 0;
+      objective.targets.col(column++) << duration_ * (rigid.angular_velocity + duration_ * rigid.angular_acceleration),
+          0;
+    }
+}
+
+// With rigid bodies as they move, or where they are.
+template <class Derived>
+const PackedVectors& ImplicitStep::guess(const Eigen::MatrixBase<Derived>& positions, bool rigid_bodies_move) {
+  state_.guess.setZero(4, newton_.objective.targets.cols());
+  Eigen::Index column = particles_.size();
+  state_.guess.leftCols(column) = positions;
+  if (rigid_bodies_move)
+    for (const RigidBody& rigid : island_.rigid_bodies)
+      if (rigid.is_dynamic()) {
+        state_.guess.col(column++) << duration_ * rigid.velocity, 0;
+        state_.guess.col(column++) << duration_ * rigid.angular_velocity, 0;
+      }
+  return state_.guess;
+}
+
 // The best of four guesses: free flight, rest, the acceleration of the last step once more, and rigid motion. In contact
 // the second and third will do, as what flies up to an obstacle goes on as it did.
 void ImplicitStep::choose_start() {
   const Objective& objective = newton_.objective;
   newton_.prepare();
-  PackedVectors& guess = state_.guess;
   const bool flies = !touches_ || !state_.has_acceleration;
   if (flies) newton_.start(objective.targets);
   if (state_.has_acceleration) {
-    guess = state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration;
-    flies ? newton_.offer(guess) : newton_.start(guess);
+    guess(state_.from + duration_ * particles_.velocities + duration_ * duration_ * state_.acceleration, true);
+    flies ? newton_.offer(state_.guess) : newton_.start(state_.guess);
   }
-  guess = state_.from;
-  for (const int i : newton_.fixed()) guess.col(i) = objective.targets.col(i);
-  newton_.offer(guess);
+  guess(state_.from, false);
+  for (const int i : newton_.fixed()) state_.guess.col(i) = objective.targets.col(i);
+  newton_.offer(state_.guess);
   if (touches_ || !is_free()) return;
   const RigidState rigid(particles_);
   const Vector3 turn = duration_ * rigid.angular_velocity(rigid.spin);
@@ -120,9 +162,10 @@ void ImplicitStep::choose_start() {
   if (!(angle > 0)) return;
   const Matrix3 rotation = Eigen::AngleAxis<Real>(angle, turn / angle).toRotationMatrix();
   const Vector3 center = rigid.center + duration_ * rigid.momentum / rigid.mass + duration_ * duration_ * body_.gravity;
+  guess(state_.from, true);
   for (int i = 0; i < particles_.size(); ++i)
-    guess.col(i).head<3>() = rotation * (state_.from.col(i).head<3>() - rigid.center) + center;
-  newton_.offer(guess);
+    state_.guess.col(i).head<3>() = rotation * (state_.from.col(i).head<3>() - rigid.center) + center;
+  newton_.offer(state_.guess);
 }
 
 // What is left of forces where nothing is, by round-off.
@@ -143,17 +186,32 @@ void ImplicitStep::minimize() {
   }
 }
 
+// Energy of what moves, as it would without forces: the share of the lightest body.
+Real ImplicitStep::kinetic_scale() const {
+  const Objective& objective = newton_.objective;
+  Real twice = 0, mass = body_.mass, lightest = body_.mass > 0 ? body_.mass : std::numeric_limits<Real>::infinity();
+  for (int i = 0; i < particles_.size(); ++i)
+    twice += objective.weights[i] * (objective.targets.col(i) - state_.from.col(i)).squaredNorm();
+  for (Eigen::Index column = particles_.size(); const RigidInertia& inertia : objective.rigid_bodies) {
+    for (const Matrix3* block : {&inertia.translation, &inertia.rotation}) {
+      const Vector3 way = objective.targets.col(column++).head<3>();
+      twice += way.dot(*block * way);
+    }
+    const Real own = duration_ * duration_ * inertia.translation(0, 0);
+    mass += own;
+    lightest = std::min(lightest, own);
+  }
+  return mass > 0 ? lightest / mass * twice / 2 : 0;
+}
+
 // By iterations that hold the limits of friction, and updates of these in between.
 void ImplicitStep::minimize_in_contact(ImplicitContacts& contacts) {
   const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
-  Real scale = 0;
-  for (int i = 0; i < particles_.size(); ++i) {
-    const Vector3 way = (newton_.objective.targets.col(i) - state_.from.col(i)).head<3>();
-    scale += newton_.objective.weights[i] * way.squaredNorm() / 2;
-  }
+  const Real scale = kinetic_scale();
   const Real enough = std::max(tolerance2 * scale, noise());
   const int most = times_iterations * body_.options.newton_iterations;
   int since_update = 0, updates = 0, age = 0;
+  Real fresh_fall = 0;
   bool is_fresh = true;  // linearised here
   newton_.linearize(newton_.may_keep_stiffness(newton_.positions(), stiffness_range()));
   Real left = newton_.squared_residual(), before = left;
@@ -165,13 +223,15 @@ void ImplicitStep::minimize_in_contact(ImplicitContacts& contacts) {
       if ((is_settled && is_balanced) || (updates >= most_updates && is_balanced) || k >= most) break;
       ++updates;
       since_update = 0;
-      contacts.update(newton_.positions(), is_balanced);
+      contacts.update(newton_.positions(), is_balanced, settled_gap * duration_);
       newton_.evaluate_again();
       left = before = newton_.squared_residual();
     }
     if (k >= most || !std::isfinite(left)) break;
     if (!is_fresh) {
-      const bool is_slow = since_update > 1 && left > slow_fall * before;
+      const Real fall = left / before;
+      if (age == 0 && since_update > 0) fresh_fall = fall;
+      const bool is_slow = since_update > 1 && fall > std::max(slow_fall, still_slow * fresh_fall);
       const bool keeps = !is_slow && age < oldest_stiffness;
       age = keeps ? age + 1 : 0;
       newton_.linearize(keeps);
@@ -204,7 +264,7 @@ void ImplicitStep::restore_momenta(const RigidState& before, const ImplicitConta
   if (force.norm() < sum_round_off * forces) force.setZero();
   if (torque.norm() < sum_round_off * torques) torque.setZero();
   Vector3 momentum = before.momentum + duration_ * (before.mass * body_.gravity + force) + contacts.impulse();
-  Vector3 spin = before.spin + duration_ * torque;
+  Vector3 spin = before.spin + duration_ * torque + contacts.moment(before.center);
   if (body_.external_forces.size() != 0)
     for (int i = 0; i < particles_.size(); ++i) {
       const Vector3 impulse = duration_ * body_.external_forces.col(i).head<3>();
@@ -212,7 +272,10 @@ void ImplicitStep::restore_momenta(const RigidState& before, const ImplicitConta
       spin += (state_.from.col(i).head<3>() - before.center).cross(impulse);
     }
   const RigidState now(particles_);
-  if (touches_) spin = now.spin;  // is no longer its own: given back on a way that obstacles bend, it would gain energy
+  if (contacts.touch_immovable())
+    spin = now.spin;  // is no longer its own: given back on a way that obstacles bend, it would gain energy
+  else if (touches_)
+    spin -= (now.center - before.center).cross(momentum);
   const Vector3 dv = (momentum - now.momentum) / now.mass, dw = now.angular_velocity(spin - now.spin);
   body_.report.restored_momentum = (momentum - now.momentum).norm();
   body_.report.restored_spin = (spin - now.spin).norm();
@@ -247,6 +310,15 @@ void ImplicitStep::cap_energy(Real allowed) {
   body_.report.capped_energy = kinetic - kinetic_energy(particles_);
 }
 
+// Turned at a constant speed, a body whose moments of inertia differ does not keep its energy.
+void ImplicitStep::drift_rigid_bodies() {
+  for (RigidBody& rigid : island_.rigid_bodies) {
+    outside_work_ -= kinetic_energy(rigid);
+    rigid.drift(duration_);
+    outside_work_ += kinetic_energy(rigid);
+  }
+}
+
 void ImplicitStep::run() {
   state_.from = particles_.positions;
   ImplicitContacts contacts(island_, state_.contacts, duration_);
@@ -260,20 +332,21 @@ void ImplicitStep::run() {
     if (!newton_.has_stiffness()) {
       newton_.objective.contacts = nullptr;
       newton_.prepare();
-      newton_.start(state_.from);
+      newton_.start(guess(state_.from, false));
       newton_.linearize();
       newton_.objective.contacts = &contacts;
     }
     contacts.set_hardness(newton_);
     choose_start();
-    contacts.predict(particles_.velocities, newton_.objective.targets, sudden * duration_ * body_.gravity.norm());
+    contacts.predict(newton_.objective.targets, sudden * duration_ * body_.gravity.norm());
     minimize_in_contact(contacts);
   }
+  for (RigidBody& rigid : island_.rigid_bodies) rigid.kick(duration_);
   contacts.finish(newton_.positions(), state_.contacts);
   newton_.objective.contacts = nullptr;
   body_.step_flows.contacts += contacts.work();
   outside_work_ += contacts.outside_work();
-  const PackedVectors& end = newton_.positions();
+  const auto end = newton_.positions().leftCols(particles_.size());
   const RigidState before = is_free() ? RigidState(particles_) : RigidState();
   state_.acceleration = ((end - state_.from) / duration_ - particles_.velocities) / duration_;
   state_.has_acceleration = true;
@@ -281,7 +354,7 @@ void ImplicitStep::run() {
     if (particles_.inverse_masses[i] > 0) particles_.velocities.col(i) = (end.col(i) - state_.from.col(i)) / duration_;
   particles_.positions = end;
   if (is_free()) restore_momenta(before, contacts);
-  for (RigidBody& rigid : island_.rigid_bodies) rigid.drift(duration_);
+  drift_rigid_bodies();
 
   body_.elastic_energy = newton_.elastic_energy();
   body_.forces = newton_.forces();
@@ -309,23 +382,34 @@ void advance_implicitly(Island& island, Real duration) {
   StepReport& report = body.report;
   report.integrator = Integrator::implicit_step;
   EnergyFlows& flows = body.step_flows;
+  RigidContacts rigid_contacts(island);
+  const auto rigid_energy = [&island] {
+    Real sum = 0;
+    for (const RigidBody& rigid : island.rigid_bodies) sum += kinetic_energy(rigid);
+    return sum;
+  };
+  const Real start_rigid_energy = rigid_energy();
   const auto undo = [&] {
     undo_step(body);
     island.rigid_bodies = island.rigid_start;
     body.implicit.newton.forget_stiffness();
     body.implicit.contacts = body.implicit.contacts_at_start;
   };
-  Real outside_work = 0;
+  Real outside_work = 0, rigid_work = 0;  // by contacts
   const auto attempt = [&](int substeps) {
     flows = {};
     for (Contact& contact : island.contacts) contact.given = {};
+    rigid_contacts.begin_attempt();
     ImplicitStep step(island, duration / substeps);
     for (int k = 0; k < substeps; ++k) step.run();
     flows.constant_forces = constant_force_work(body);
     outside_work = step.outside_work();
+    rigid_work = rigid_energy() - start_rigid_energy;
+    for (std::size_t k = 0; k < island.rigid_bodies.size(); ++k)
+      rigid_work -= work_of_accelerations(island.rigid_bodies[k], island.rigid_start[k]);
     // What contacts and damping take is not asked for: of a body that turns on its way, the latter is not what its work is.
     const Real allowed =
-        start_energy + flows.received() - flows.contacts + outside_work - (flows.lost() - flows.damping);
+        start_energy + flows.received() - flows.contacts + outside_work - rigid_work - (flows.lost() - flows.damping);
     // What drives pinned particles is known to the order of the step only.
     const bool is_driven = flows.driving != 0;
     if (!is_driven) step.cap_energy(allowed);
@@ -334,7 +418,7 @@ void advance_implicitly(Island& island, Real duration) {
     return Attempt{.substeps = substeps,
                    .energy = end_energy,
                    .allowed = allowed,
-                   .noise = tolerance * std::max(start_energy, end_energy) + body.energy_noise};
+                   .noise = tolerance * (std::max(start_energy, end_energy) + start_rigid_energy) + body.energy_noise};
   };
   const GuardedStep step =
       guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2}, attempt, undo);
@@ -345,8 +429,8 @@ void advance_implicitly(Island& island, Real duration) {
   SurfaceContacts surfaces(island);
   find_records(island, surfaces);
   if (step.finite) {
-    const Real missing = step.attempt.allowed - outside_work + flows.contacts - step.attempt.energy;
-    flows.contact_loss = outside_work - flows.contacts;
+    flows.contact_loss = outside_work - rigid_work - flows.contacts;
+    const Real missing = step.attempt.allowed - flows.contact_loss - step.attempt.energy;
     flows.damping = std::clamp<Real>(missing, 0, flows.damping);
     flows.integration = missing - flows.damping;
   } else {

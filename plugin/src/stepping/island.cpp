@@ -10,15 +10,20 @@
 namespace penalty {
 namespace {
 
-// Slower than what comes to rest, seen from what it touches.
+// All of it slower than what comes to rest, seen from what holds it up.
 bool lies(const Island& island) {
   const SteppedBody& body = *island.bodies.front();
-  const RigidBody& ground = island.rigid_bodies[island.contacts.front().b.rigid];
+  const RigidBody still, *ground = &still;
+  for (const Contact& contact : island.contacts)
+    if (const RigidBody& rigid = island.rigid_bodies[contact.b.rigid]; !rigid.is_dynamic()) ground = &rigid;
   const Real limit = body.options.settling_speed * std::sqrt(body.gravity.norm() * body.size);
-  for (int i = 0; i < body.particles.size(); ++i) {
-    const Vector3 arm = body.particles.positions.col(i).head<3>() - ground.position;
-    if (!((body.particles.velocities.col(i).head<3>() - ground.velocity_at(arm)).norm() < limit)) return false;
-  }
+  const auto is_slow = [&](const Vector3& position, const Vector3& velocity) {
+    return (velocity - ground->velocity_at(position - ground->position)).norm() < limit;
+  };
+  for (const RigidBody& rigid : island.rigid_bodies)
+    if (rigid.is_dynamic() && !is_slow(rigid.position, rigid.velocity)) return false;
+  for (int i = 0; i < body.particles.size(); ++i)
+    if (!is_slow(body.particles.positions.col(i).head<3>(), body.particles.velocities.col(i).head<3>())) return false;
   return true;
 }
 
@@ -35,11 +40,14 @@ bool wants_implicit_step(const Island& island, Real duration) {
 }
 
 bool steps_implicitly(Island& island, Real duration) {
-  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.anchors.empty() ||
-      !island.rigid_contacts.empty() || !island.joints.empty())
+  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.anchors.empty() || !island.joints.empty())
     return false;
   for (const Contact& contact : island.contacts)
-    if (!contact.b.is_rigid() || island.rigid_bodies[contact.b.rigid].is_dynamic()) return false;
+    if (!contact.b.is_rigid()) return false;
+  for (const RigidBody& rigid : island.rigid_bodies)
+    if (rigid.is_dynamic() && !rigid.is_free()) return false;
+  for (const RigidContact& contact : island.rigid_contacts)
+    if (contact.restitution > 0 || contact.rolling > 0 || contact.spinning > 0) return false;
   if (!wants_implicit_step(island, duration)) return false;
   SurfaceContacts surfaces(island);
   surfaces.begin_step(duration);

@@ -41,18 +41,20 @@ std::vector<int> group_neighbours(const BlockMatrix& matrix, int size) {
 
 }  // namespace
 
-void LinearSystem::clear_fixed(Forces v) const {
+void LinearSystem::clear_fixed(PackedVectors& v) const {
   for (const int i : fixed) v.col(i).setZero();
 }
 
-void LinearSystem::multiply(const Vectors& x, Forces y) const {
+void LinearSystem::multiply(const PackedVectors& x, PackedVectors& y) const {
+  const int num_particles = matrix.num_particles();
   y.setZero();
-  matrix.add_product(x, 1, y);
-  for (const ContactStiffness& contact : contacts) {
-    const Vector3 force = contact.stiffness * contact.point.of(x);
-    for (int k = 0; k < contact.point.size; ++k)
-      y.col(contact.point.particles[k]).head<3>() += contact.point.weights[k] * force;
+  matrix.add_product(x.leftCols(num_particles), 1, y.leftCols(num_particles));
+  for (std::size_t k = 0; k < rigid_bodies.size(); ++k) {
+    const Eigen::Index column = num_particles + 2 * static_cast<Eigen::Index>(k);
+    y.col(column).head<3>() = rigid_bodies[k].translation * x.col(column).head<3>();
+    y.col(column + 1).head<3>() = rigid_bodies[k].rotation * x.col(column + 1).head<3>();
   }
+  for (const ContactStiffness& contact : contacts) contact.sides.add(contact.stiffness * contact.sides.distance(x), y);
   clear_fixed(y);
 }
 
@@ -70,10 +72,8 @@ void LinearSolver::set_pattern(const BlockMatrix& matrix) {
   diagonal_.resize(num_particles);
   inverse_diagonal_.resize(num_particles);
   moves_.resize(num_particles);
-  for (PackedVectors* v : {&arms_, &residual_, &preconditioned_, &search_, &product_}) v->setZero(4, num_particles);
+  arms_.setZero(4, num_particles);
   coarse_blocks_.resize(6 * groups, 6 * groups);
-  coarse_.resize(6 * groups, 6 * groups);
-  coarse_scale_.resize(6 * groups);
   coarse_vector_.resize(6 * groups);
 }
 
@@ -86,6 +86,8 @@ void LinearSolver::factorize(const LinearSystem& system, const Positions& x) {
 }
 
 void LinearSolver::factorize_contacts(const LinearSystem& system) {
+  for (PackedVectors* v : {&residual_, &preconditioned_, &search_, &product_})
+    if (v->cols() != system.num_columns()) v->setZero(4, system.num_columns());
   invert_diagonal(system);
   factorize_coarse(system);
 }
@@ -103,11 +105,11 @@ void LinearSolver::sum_blocks(const LinearSystem& system) {
 
 void LinearSolver::invert_diagonal(const LinearSystem& system) {
   inverse_diagonal_ = diagonal_;
-  for (const ContactStiffness& contact : system.contacts)
-    for (int k = 0; k < contact.point.size; ++k) {
-      const Real weight = contact.point.weights[k];
-      inverse_diagonal_[contact.point.particles[k]] += weight * weight * contact.stiffness;
-    }
+  for (const ContactStiffness& contact : system.contacts) {
+    const WeightedPoint& point = contact.sides.point;
+    for (int k = 0; k < point.size; ++k)
+      inverse_diagonal_[point.particles[k]] += point.weights[k] * point.weights[k] * contact.stiffness;
+  }
   for (Matrix3& block : inverse_diagonal_) {
     const Real trace = block.trace();
     block.diagonal().array() += trace > 0 ? 1e-12 * trace : 1;
@@ -118,15 +120,15 @@ void LinearSolver::invert_diagonal(const LinearSystem& system) {
 
 // What block (i, j) adds to the lower triangle of Zᵀ A Z, where column 6g + k of Z is the k-th rigid motion of group g:
 // particle i, at r_i from its centre, moves by t + w x r_i.
-void LinearSolver::add_coarse_block(int i, int j, const Matrix3& block, Eigen::MatrixXd& coarse) const {
+void LinearSolver::add_coarse_block(int i, int j, const Matrix3& block) {
   const int row = 6 * group_of_[i], column = 6 * group_of_[j];
   if (column > row || moves_[i] == 0 || moves_[j] == 0) return;
   const Matrix3 arm_i = cross_matrix(arms_.col(i).head<3>());
   const Matrix3 turned = block * cross_matrix(arms_.col(j).head<3>());
-  coarse.block<3, 3>(row, column) += block;
-  coarse.block<3, 3>(row, column + 3) -= turned;
-  coarse.block<3, 3>(row + 3, column) += arm_i * block;
-  coarse.block<3, 3>(row + 3, column + 3) -= arm_i * turned;
+  coarse_blocks_.block<3, 3>(row, column) += block;
+  coarse_blocks_.block<3, 3>(row, column + 3) -= turned;
+  coarse_blocks_.block<3, 3>(row + 3, column) += arm_i * block;
+  coarse_blocks_.block<3, 3>(row + 3, column + 3) -= arm_i * turned;
 }
 
 void LinearSolver::sum_coarse_blocks(const LinearSystem& system, const Positions& x) {
@@ -143,28 +145,61 @@ void LinearSolver::sum_coarse_blocks(const LinearSystem& system, const Positions
   }
   coarse_blocks_.setZero();
   for (int i = 0; i < system.matrix.num_particles(); ++i)
-    system.matrix.blocks().visit_row(
-        i, [&](int j, const Matrix3& block) { add_coarse_block(i, j, block, coarse_blocks_); });
+    system.matrix.blocks().visit_row(i, [&](int j, const Matrix3& block) { add_coarse_block(i, j, block); });
   for (const RankOneTerm& term : system.matrix.terms()) {
-    coarse_vector_.setZero();
+    auto motion = coarse_vector_.head(coarse_blocks_.rows());
+    motion.setZero();
     for (std::size_t k = 0; k < term.particles.size(); ++k) {
       const int i = term.particles[k], row = 6 * group_of_[i];
       const Vector3 d = moves_[i] * term.direction.col(static_cast<Eigen::Index>(k));
-      coarse_vector_.segment<3>(row) += d;
-      coarse_vector_.segment<3>(row + 3) += Vector3(arms_.col(i).head<3>()).cross(d);
+      motion.segment<3>(row) += d;
+      motion.segment<3>(row + 3) += Vector3(arms_.col(i).head<3>()).cross(d);
     }
-    coarse_blocks_.selfadjointView<Eigen::Lower>().rankUpdate(coarse_vector_, term.coefficient);
+    coarse_blocks_.selfadjointView<Eigen::Lower>().rankUpdate(motion, term.coefficient);
+  }
+}
+
+// What a contact adds to it, group by group: a rigid body, at its arm, moves by t + w x arm, too.
+void LinearSolver::add_coarse_contact(const LinearSystem& system, const ContactStiffness& contact) {
+  coarse_motions_.clear();
+  const auto add = [this](int group, Real weight, const Vector3& arm) {
+    const auto known = std::ranges::find(coarse_motions_, group, [](const auto& motion) { return motion.first; });
+    auto& motion = known != coarse_motions_.end()
+                       ? known->second
+                       : coarse_motions_.emplace_back(group, Eigen::Matrix<Real, 3, 6>::Zero()).second;
+    motion.leftCols<3>().diagonal().array() += weight;
+    motion.rightCols<3>() -= weight * cross_matrix(arm);
+  };
+  const ContactSides& sides = contact.sides;
+  for (int k = 0; k < sides.point.size; ++k)
+    if (const int i = sides.point.particles[k]; moves_[i] != 0)
+      add(group_of_[i], sides.point.weights[k], arms_.col(i).head<3>());
+  for (int k = 0; k < sides.num_rigid; ++k) {
+    const auto& [column, sign, arm] = sides.rigid[k];
+    add(num_groups() + (column - system.matrix.num_particles()) / 2, sign, arm);
+  }
+  for (const auto& [group, motion] : coarse_motions_) {
+    const Eigen::Matrix<Real, 6, 3> pulled = motion.transpose() * contact.stiffness;
+    for (const auto& [other, moved] : coarse_motions_)
+      if (other <= group) coarse_.block<6, 6>(6 * group, 6 * other) += pulled * moved;
   }
 }
 
 void LinearSolver::factorize_coarse(const LinearSystem& system) {
-  if (num_groups() == 0) return;
-  coarse_ = coarse_blocks_;
-  for (const ContactStiffness& contact : system.contacts)
-    for (int k = 0; k < contact.point.size; ++k)
-      for (int l = 0; l < contact.point.size; ++l)
-        add_coarse_block(contact.point.particles[k], contact.point.particles[l],
-                         contact.point.weights[k] * contact.point.weights[l] * contact.stiffness, coarse_);
+  const Eigen::Index of_particles = 6 * num_groups();
+  const Eigen::Index size = of_particles + 6 * static_cast<Eigen::Index>(system.rigid_bodies.size());
+  if (size == 0) return;
+  coarse_.resize(size, size);
+  coarse_scale_.resize(size);
+  coarse_vector_.resize(size);
+  coarse_.topLeftCorner(of_particles, of_particles) = coarse_blocks_;
+  coarse_.bottomRows(size - of_particles).setZero();
+  for (std::size_t k = 0; k < system.rigid_bodies.size(); ++k) {
+    const Eigen::Index at = of_particles + 6 * static_cast<Eigen::Index>(k);
+    coarse_.block<3, 3>(at, at) = system.rigid_bodies[k].translation;
+    coarse_.block<3, 3>(at + 3, at + 3) = system.rigid_bodies[k].rotation;
+  }
+  for (const ContactStiffness& contact : system.contacts) add_coarse_contact(system, contact);
   for (Eigen::Index k = 0; k < coarse_.rows(); ++k)
     coarse_scale_[k] = coarse_(k, k) > 0 ? 1 / std::sqrt(coarse_(k, k)) : 0;
   for (Eigen::Index column = 0; column < coarse_.cols(); ++column) {
@@ -185,10 +220,14 @@ void LinearSolver::precondition(const LinearSystem& system, const PackedVectors&
     coarse_vector_.segment<3>(row) += own;
     coarse_vector_.segment<3>(row + 3) += Vector3(arms_.col(i).head<3>()).cross(own);
   }
+  for (Eigen::Index row = 6 * num_groups(), i = num_particles; i < r.cols(); ++i, row += 3)
+    coarse_vector_.segment<3>(row) = r.col(i).head<3>();
   coarse_vector_.array() *= coarse_scale_.array();
   coarse_.triangularView<Eigen::Lower>().solveInPlace(coarse_vector_);
   coarse_.triangularView<Eigen::Lower>().adjoint().solveInPlace(coarse_vector_);
   coarse_vector_.array() *= coarse_scale_.array();
+  for (Eigen::Index row = 6 * num_groups(), i = num_particles; i < r.cols(); ++i, row += 3)
+    z.col(i).head<3>() = coarse_vector_.segment<3>(row);
   for (int i = 0; i < num_particles; ++i) {
     const int row = 6 * group_of_[i];
     const Vector3 turn = coarse_vector_.segment<3>(row + 3);
@@ -201,8 +240,9 @@ Real LinearSolver::squared_norm(const LinearSystem& system, const PackedVectors&
   return r.cwiseProduct(preconditioned_).sum();
 }
 
-LinearReport LinearSolver::solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x) {
-  x.setZero();
+LinearReport LinearSolver::solve(const LinearSystem& system, const PackedVectors& b, const LinearOptions& options,
+                                 PackedVectors& x) {
+  x.setZero(4, b.cols());
   residual_ = b;
   system.clear_fixed(residual_);
   precondition(system, residual_, preconditioned_);

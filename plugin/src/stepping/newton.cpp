@@ -26,33 +26,44 @@ void NewtonSolver::set_pattern(const PotentialField& field) {
   damping_ = system_.matrix;
   solver_.set_pattern(system_.matrix.blocks());
   for (PackedVectors* v : {&here_.positions, &here_.forces, &here_.gradient, &trial_.positions, &trial_.forces,
-                           &trial_.gradient, &direction_, &displacement_, &damping_force_})
+                           &trial_.gradient, &direction_, &right_side_, &displacement_, &damping_force_})
     v->setZero(4, num_particles);
   num_elements_ = field.num_elements();
   field_ = &field;
 }
 
 void NewtonSolver::evaluate(State& state) {
-  const PackedVectors& x = state.positions;
+  const Eigen::Index num_particles = state.forces.cols();
+  const auto x = state.positions.leftCols(num_particles);
   state.forces.setZero();
   state.elastic_energy = objective.field->add_forces(x, state.forces);
-  state.gradient = -state.forces;
+  state.gradient.resize(4, state.positions.cols());
+  auto gradient = state.gradient.leftCols(num_particles);
+  gradient = -state.forces;
   state.value = state.elastic_energy;
   state.magnitude = state.elastic_energy;
   if (!objective.weights.empty()) {
     Real inertia = 0;
-    for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    for (Eigen::Index i = 0; i < num_particles; ++i) {
       const Real w = objective.weights[static_cast<std::size_t>(i)];
       const Vector3 d = (x.col(i) - objective.targets.col(i)).head<3>();
       inertia += w * d.squaredNorm();
-      state.gradient.col(i).head<3>() += w * d;
+      gradient.col(i).head<3>() += w * d;
     }
+    Eigen::Index column = num_particles;
+    for (const auto& [translation, rotation] : objective.rigid_bodies)
+      for (const Matrix3* block : {&translation, &rotation}) {
+        const Vector3 d = (state.positions.col(column) - objective.targets.col(column)).head<3>();
+        const Vector3 force = *block * d;
+        inertia += d.dot(force);
+        state.gradient.col(column++) << force, 0;
+      }
     state.value += inertia / 2;
     state.magnitude += inertia / 2;
   }
   if (objective.loads.size() != 0) {
     const Real work = objective.loads.cwiseProduct(x).sum();
-    state.gradient -= objective.loads;
+    gradient -= objective.loads;
     state.value -= work;
     state.magnitude += objective.loads.cwiseProduct(x).cwiseAbs().sum();
   }
@@ -62,12 +73,12 @@ void NewtonSolver::evaluate(State& state) {
     damping_force_.setZero();
     damping_.add_product(displacement_, 1, damping_force_);
     state.damping = displacement_.cwiseProduct(damping_force_).sum() / 2;
-    state.gradient += damping_force_;
+    gradient += damping_force_;
     state.value += state.damping;
     state.magnitude += state.damping;
   }
   if (objective.contacts) {
-    const Real energy = objective.contacts->evaluate(x, state.gradient);
+    const Real energy = objective.contacts->evaluate(state.positions, state.gradient);
     state.value += energy;
     state.magnitude += std::abs(energy);
   }
@@ -96,51 +107,55 @@ void NewtonSolver::offer(const PackedVectors& x) {
 void NewtonSolver::assemble() {
   System& matrix = system_.matrix;
   matrix.set_zero();
-  objective.field->add_stiffness(here_.positions, StiffnessModel::psd_projected, matrix);
-  if (objective.damped_from.size() != 0) matrix.add(damping_);
   const int num_particles = matrix.num_particles();
+  const auto positions = here_.positions.leftCols(num_particles);
+  objective.field->add_stiffness(positions, StiffnessModel::psd_projected, matrix);
+  if (objective.damped_from.size() != 0) matrix.add(damping_);
   Real stiffness = 0;
   for (int i = 0; i < num_particles; ++i) stiffness += matrix.blocks().diagonal(i).trace() / 3;
   const Real shift = regularization * stiffness / std::max(num_particles, 1);
   // A turned body has F far from 1, and energies of elements that are small differences of large numbers.
-  const auto x = here_.positions.topRows<3>();
+  const auto x = positions.topRows<3>();
   energy_noise_ = epsilon * stiffness * (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).squaredNorm();
   for (int i = 0; i < num_particles; ++i) {
     const Real weight = objective.weights.empty() ? 0 : objective.weights[i];
     matrix.add_to_diagonal(i, weight + shift);
   }
   has_stiffness_ = true;
-  assembled_at_ = here_.positions;
+  assembled_at_ = positions;
   assembled_weights_ = objective.weights;
 }
 
 void NewtonSolver::linearize(bool keeps_stiffness) {
   if (!keeps_stiffness) assemble();
+  system_.rigid_bodies = objective.rigid_bodies;
   system_.contacts.clear();
-  displacement_ = -here_.gradient;
-  if (objective.contacts) objective.contacts->linearize(here_.positions, system_.contacts, displacement_);
+  right_side_ = -here_.gradient;
+  if (objective.contacts) objective.contacts->linearize(here_.positions, system_.contacts, right_side_);
   if (keeps_stiffness)
     solver_.factorize_contacts(system_);
   else
-    solver_.factorize(system_, here_.positions);
+    solver_.factorize(system_, here_.positions.leftCols(system_.matrix.num_particles()));
 }
 
 Real NewtonSolver::squared_residual() { return solver_.squared_norm(system_, here_.gradient); }
 
 bool NewtonSolver::may_keep_stiffness(const PackedVectors& x, Real distance) const {
   if (!has_stiffness_ || assembled_weights_ != objective.weights) return false;
-  const Eigen::Matrix<Real, 4, 1> shift = (x - assembled_at_).rowwise().mean();
-  return !(((x - assembled_at_).colwise() - shift).colwise().squaredNorm().maxCoeff() > distance * distance);
+  const auto moved = x.leftCols(assembled_at_.cols()) - assembled_at_;
+  const Eigen::Matrix<Real, 4, 1> shift = moved.rowwise().mean();
+  return !((moved.colwise() - shift).colwise().squaredNorm().maxCoeff() > distance * distance);
 }
 
 NewtonIteration NewtonSolver::descend() {
   NewtonIteration iteration;
-  const LinearReport solved = solver_.solve(system_, displacement_, linear, direction_);
+  const LinearReport solved = solver_.solve(system_, right_side_, linear, direction_);
   iteration.linear_iterations = solved.iterations;
   iteration.before = solved.squared_norm;
   const Real slope = here_.gradient.cwiseProduct(direction_).sum();
   if (!(slope < 0)) return iteration;
-  iteration.displacement = std::sqrt(direction_.colwise().squaredNorm().maxCoeff());
+  const auto of_particles = direction_.leftCols(system_.matrix.num_particles());
+  iteration.displacement = std::sqrt(of_particles.colwise().squaredNorm().maxCoeff());
 
   Real length = 1;
   for (int k = 0; k < most_backtracks; ++k) {

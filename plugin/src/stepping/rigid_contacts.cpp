@@ -14,6 +14,17 @@ constexpr Real impact_approach = 4;
 
 }  // namespace
 
+RigidContactPlace place_of(const RigidContact& contact, const Island& island) {
+  const RigidBody &a = island.rigid_bodies[contact.a], &b = island.rigid_bodies[contact.b];
+  const Vector3 normal = b.rotation * contact.normal;
+  Vector3 at_a = a.position + a.rotation * contact.anchor_a, at_b = b.position + b.rotation * contact.anchor_b;
+  if (contact.radius > 0) {  // opposite that is what it has rolled to
+    at_a -= contact.radius * normal;
+    at_b += at_a - at_b - normal.dot(at_a - at_b) * normal;
+  }
+  return {.at = (at_a + at_b) / 2, .normal = normal, .gap = normal.dot(at_a - at_b)};
+}
+
 RigidContacts::RigidContacts(Island& island) : island_(island) {
   start_.reserve(island.rigid_contacts.size());
   for (const RigidContact& contact : island.rigid_contacts) start_.push_back({contact.force, contact.moment});
@@ -24,13 +35,7 @@ void RigidContacts::begin(Real h, Real since) {
   rows_.clear();
   for (const RigidContact& contact : island_.rigid_contacts) {
     RigidBody &a = island_.rigid_bodies[contact.a], &b = island_.rigid_bodies[contact.b];
-    const Vector3 normal = b.rotation * contact.normal;
-    Vector3 at_a = a.position + a.rotation * contact.anchor_a, at_b = b.position + b.rotation * contact.anchor_b;
-    if (contact.radius > 0) {  // opposite that is what it has rolled to
-      at_a -= contact.radius * normal;
-      at_b += at_a - at_b - normal.dot(at_a - at_b) * normal;
-    }
-    const Vector3 at = (at_a + at_b) / 2;
+    const auto [at, normal, gap] = place_of(contact, island_);
     Row row{.a = &a,
             .b = &b,
             .a_moves = a.is_dynamic(),
@@ -40,7 +45,7 @@ void RigidContacts::begin(Real h, Real since) {
             .normal = normal};
     row.mobility = a.mobility_at(row.arm_a) + b.mobility_at(row.arm_b);
     row.normal_mobility = row.normal.dot(row.mobility * row.normal);
-    const Real gap = row.normal.dot(at_a - at_b), speed = row.normal.dot(relative_velocity(row));
+    const Real speed = row.normal.dot(relative_velocity(row));
     row.recovery = recovery_of(-gap, rigid_slop, h);
     row.wanted = gap > 0 ? -gap / h : row.recovery;
     row.is_impact = -speed > impact_approach * acceleration_ * since;

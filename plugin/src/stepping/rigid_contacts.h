@@ -6,6 +6,13 @@
 
 namespace penalty {
 
+/// Where a contact is: halfway between the points of a and b, with the normal from b to a.
+struct RigidContactPlace {
+  Vector3 at, normal;
+  Real gap;  // negative: depth [m]
+};
+RigidContactPlace place_of(const RigidContact& contact, const Island& island);
+
 /// Sequential impulses on the velocities of a substep, summed and clipped contact by contact: E. Catto, Iterative Dynamics
 /// with Temporal Coherence (2005). Of the gap g and the relative normal speed u each asks u >= -g/h while the gap is open,
 /// u >= 0 when it is closed; depth comes back as in ParticleContacts. Both bodies take the impulse at the same point, so both

@@ -29,6 +29,7 @@ struct WeightedPoint {
     for (int k = 0; k < size; ++k) sum += weights[k] * Eigen::Map<const Vector3>(vectors.data() + 4 * particles[k]);
     return sum;
   }
+  Vector3 of(const Vectors& vectors) const = delete;  // would copy them all, at every call
 
   /// Inverse of the mass that an impulse on the point meets [1/kg].
   Real mobility(std::span<const Real> inverse_masses) const {

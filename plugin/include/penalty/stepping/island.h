@@ -151,15 +151,16 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
 /// end of a step.
 ///
-/// Implicitly, a body by itself or on what cannot move, see Integrator: the positions at the end minimise
+/// Implicitly, one soft body and the rigid ones that it touches, see Integrator: the positions at the end minimise
 ///
 ///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h + contacts
 ///
-/// by projected Newton iterations with a line search; contacts press and rub by stiff potentials of their own, with
-/// multipliers and limits of friction that are updated in between. Depth is taken back at half a metre a second at most.
-/// Unlike that minimum, which turns too slowly, the step keeps the angular momentum of a free body that touches nothing,
-/// and the linear one in spite of iterations that end early: a rigid velocity is added. Energy that would grow all the
-/// same is taken from the velocities that deform the body. StepReport says how much.
+/// by projected Newton iterations with a line search; a rigid body adds the like of the first term for its translation and
+/// its rotation vector. Contacts press and rub by stiff potentials of their own, with multipliers and limits of friction that are
+/// updated in between. Depth is taken back at half a metre a second at most. Unlike that minimum, which turns too slowly,
+/// the step keeps the angular momentum of a free body that touches nothing but free bodies, and the linear one in spite of
+/// iterations that end early: a rigid velocity is added. Energy that would grow all the same is taken from the velocities
+/// that deform the body. StepReport says how much.
 ///
 /// Linear and angular momentum of free bodies and touched rigid ones are kept to round-off, but for the gyroscopic term
 /// of a rigid body with unequal moments of inertia, which is left to Bullet. A step that cannot be made finite is

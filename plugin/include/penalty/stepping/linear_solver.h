@@ -9,24 +9,67 @@
 
 namespace penalty {
 
-/// What a contact adds to a system: Jᵀ G J, where J x is what x says of the point.
+/// The two sides of a contact: a point of particles, or none, and points of up to two rigid bodies. What x says of their
+/// distance is J x, the sum of w_k x_k over the particles and of s (t + theta x arm) over the rigid bodies, whose columns of x
+/// are their translation t [m] and their rotation vector theta [rad].
+struct ContactSides {
+  struct OnRigid {
+    int column = 0;  // of t; that of theta is the next
+    Real sign = 0;   // s, 1 or -1
+    Vector3 arm = Vector3::Zero();
+  };
+  WeightedPoint point = {};
+  std::array<OnRigid, 2> rigid = {};
+  int num_rigid = 0;
+
+  /// J x.
+  Vector3 distance(const PackedVectors& x) const {
+    Vector3 sum = point.of(x);
+    for (int k = 0; k < num_rigid; ++k) {
+      const auto& [column, sign, arm] = rigid[k];
+      sum += sign * (x.col(column).head<3>() + x.col(column + 1).head<3>().cross(arm));
+    }
+    return sum;
+  }
+
+  /// y += Jᵀ force.
+  void add(const Vector3& force, PackedVectors& y) const {
+    for (int k = 0; k < point.size; ++k) y.col(point.particles[k]).head<3>() += point.weights[k] * force;
+    for (int k = 0; k < num_rigid; ++k) {
+      const auto& [column, sign, arm] = rigid[k];
+      y.col(column).head<3>() += sign * force;
+      y.col(column + 1).head<3>() += sign * arm.cross(force);
+    }
+  }
+};
+
+/// What a contact adds to a system: Jᵀ G J.
 struct ContactStiffness {
-  WeightedPoint point;
+  ContactSides sides;
   Matrix3 stiffness;  // G, positive semidefinite [N/m]
 };
 
-/// A positive definite system: matrix + contacts. Particles in `fixed`, sorted, do not move: their rows and columns count
-/// as those of the identity.
+/// What a rigid body adds to a system: two blocks on the diagonal.
+struct RigidInertia {
+  Matrix3 translation;  // [N/m]
+  Matrix3 rotation;     // [N m]
+};
+
+/// A positive definite system: matrix + rigid bodies + contacts. The columns of particles come first, then two for each
+/// rigid body. Particles in `fixed`, sorted, do not move: their rows and columns count as those of the identity.
 struct LinearSystem {
   System matrix;
+  std::vector<RigidInertia> rigid_bodies = {};
   std::vector<ContactStiffness> contacts = {};
   std::vector<int> fixed = {};
 
+  int num_columns() const { return matrix.num_particles() + 2 * static_cast<int>(rigid_bodies.size()); }
+
   /// y = A x but for the rows of fixed particles, which are zero; those of x are to be zero.
-  void multiply(const Vectors& x, Forces y) const;
+  void multiply(const PackedVectors& x, PackedVectors& y) const;
 
   /// Sets the columns of fixed particles to zero.
-  void clear_fixed(Forces v) const;
+  void clear_fixed(PackedVectors& v) const;
 };
 
 struct LinearReport {
@@ -36,8 +79,8 @@ struct LinearReport {
 
 /// Preconditioned conjugate gradients. The preconditioner is additive: the inverses of the 3 x 3 blocks on the diagonal
 /// take care of what is stiff and near, and a coarse space of what is smooth: the particles in groups of neighbours,
-/// each of which moves as a rigid body (6 unknowns a group, a dense Cholesky factorisation). Deterministic, and
-/// without allocation once a system of the same size has been solved.
+/// each of which moves as a rigid body (6 unknowns a group, a dense Cholesky factorisation); rigid bodies are groups, too.
+/// Deterministic, and without allocation once a system of the same size has been solved.
 class LinearSolver {
  public:
   /// Makes the groups from the pattern of the matrix.
@@ -51,11 +94,13 @@ class LinearSolver {
 
   /// Solves A x = b from x = 0; the columns of fixed particles become zero. Whatever the number of iterations, b . x >
   /// 0 unless b is zero or not finite.
-  LinearReport solve(const LinearSystem& system, const Vectors& b, const LinearOptions& options, Forces x);
+  LinearReport solve(const LinearSystem& system, const PackedVectors& b, const LinearOptions& options,
+                     PackedVectors& x);
 
   /// r . P⁻¹ r, P the preconditioner.
   Real squared_norm(const LinearSystem& system, const PackedVectors& r);
 
+  /// Of particles.
   int num_groups() const { return static_cast<int>(group_begin_.empty() ? 0 : group_begin_.size() - 1); }
 
  private:
@@ -64,7 +109,8 @@ class LinearSolver {
   void sum_coarse_blocks(const LinearSystem& system, const Positions& x);
   void invert_diagonal(const LinearSystem& system);
   void factorize_coarse(const LinearSystem& system);
-  void add_coarse_block(int i, int j, const Matrix3& block, Eigen::MatrixXd& coarse) const;
+  void add_coarse_block(int i, int j, const Matrix3& block);
+  void add_coarse_contact(const LinearSystem& system, const ContactStiffness& contact);
 
   std::vector<int> group_of_;  // of each particle
   std::vector<int> group_begin_, group_members_;
@@ -74,6 +120,7 @@ class LinearSolver {
   Eigen::MatrixXd coarse_blocks_;                     // the coarse matrix without contacts, lower triangle
   Eigen::MatrixXd coarse_;                            // its Cholesky factor, contacts included, in the lower triangle
   Eigen::VectorXd coarse_scale_, coarse_vector_;
+  std::vector<std::pair<int, Eigen::Matrix<Real, 3, 6>>> coarse_motions_;  // of a contact: by group
   PackedVectors residual_, preconditioned_, search_, product_;
 };
 

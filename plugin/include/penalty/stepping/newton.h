@@ -12,23 +12,25 @@ class ImplicitContacts;
 ///     Phi(x) = E(x) + sum_i w_i/2 |x_i - t_i|² - sum_i f_i . x_i + (x - x0)ᵀ D (x - x0) / 2
 ///
 /// E is the energy of the field; the implicit step has w_i = m_i / h² and t_i where particle i would be without forces;
-/// damping has D = damping matrix / h at x0, where the step began. Contacts add a potential of their own. Whatever is
-/// empty is left out.
+/// damping has D = damping matrix / h at x0, where the step began. Contacts add a potential of their own. Rigid bodies that
+/// particles touch have two columns of x after those of the particles: translation and rotation vector since the step began;
+/// their inertia takes the place of w_i. Whatever is empty is left out.
 struct Objective {
   const PotentialField* field = nullptr;
-  std::vector<Real> weights;  // w_i [N/m]
-  PackedVectors targets;      // t_i [m]
-  PackedVectors loads;        // f_i [N]
-  PackedVectors damped_from;  // x0 [m]; empty: no damping
-  Real damping_time = 0;      // of the elements, besides their own [s]
-  Real inverse_duration = 0;  // 1 / h [1/s]
+  std::vector<Real> weights;               // w_i [N/m]
+  PackedVectors targets;                   // t_i [m], and of rigid bodies
+  PackedVectors loads;                     // f_i [N]
+  PackedVectors damped_from;               // x0 [m]; empty: no damping
+  Real damping_time = 0;                   // of the elements, besides their own [s]
+  Real inverse_duration = 0;               // 1 / h [1/s]
+  std::vector<RigidInertia> rigid_bodies;  // mass / h² and moments of inertia / h²
   ImplicitContacts* contacts = nullptr;
 };
 
 /// One iteration, from x to x + length * d.
 struct NewtonIteration {
   Real before = 0, after = 0;  // dPhi . P⁻¹ dPhi, P the preconditioner: about twice what Phi could still fall by [J]
-  Real displacement = 0;       // largest |d_i| [m]
+  Real displacement = 0;       // largest |d_i| of a particle [m]
   Real length = 0;             // 0: no way down was found
   int linear_iterations = 0;
 };
@@ -87,11 +89,11 @@ class NewtonSolver {
   /// Of the last iteration [m].
   const PackedVectors& direction() const { return direction_; }
 
-  const PackedVectors& positions() const { return here_.positions; }
-  const PackedVectors& forces() const { return here_.forces; }      // -dE/dx [N]
-  const PackedVectors& gradient() const { return here_.gradient; }  // dPhi/dx, zero of fixed particles [N]
-  Real elastic_energy() const { return here_.elastic_energy; }      // E [J]
-  Real value() const { return here_.value; }                        // Phi [J]
+  const PackedVectors& positions() const { return here_.positions; }  // columns of rigid bodies included
+  const PackedVectors& forces() const { return here_.forces; }        // -dE/dx [N]
+  const PackedVectors& gradient() const { return here_.gradient; }    // dPhi/dx, zero of fixed particles [N]
+  Real elastic_energy() const { return here_.elastic_energy; }        // E [J]
+  Real value() const { return here_.value; }                          // Phi [J]
 
   /// (x - x0)ᵀ D (x - x0): what damping has taken since x0, were it linear on the way [J].
   Real damping_work() const { return 2 * here_.damping; }
@@ -113,7 +115,7 @@ class NewtonSolver {
   LinearSolver solver_;
   State here_, trial_;
   Real energy_noise_ = 0;  // of the potential, a guess [J]
-  PackedVectors direction_, displacement_, damping_force_;
+  PackedVectors direction_, right_side_, displacement_, damping_force_;
   bool has_stiffness_ = false;
   PackedVectors assembled_at_;
   std::vector<Real> assembled_weights_;
