@@ -91,7 +91,8 @@ CommandLine parse(int argc, const char* const* argv) {
   table->add_flag("--json", table_command.json, "As JSON");
   plot->add_option("results", paths, "Directories or files of results")->required()->type_name("DIR|FILE");
   plot->add_option("--out", out, "The picture")->required()->type_name("FILE.png");
-  stability->add_option("--time", time, "Simulated time of every flight and chain [s]; else 2 and 10")->type_name("S");
+  stability->add_option("--time", time, "Simulated time of every flight, chain and impact [s]; else 2, 10 and 4")
+      ->type_name("S");
   demo::read_as_decimal(*run, {"--jobs", "--seeds", "--time"});
   demo::read_as_decimal(*stability, {"--time"});
 

@@ -5,6 +5,7 @@
 #include "main/progress.h"
 #include "penalty/mesh/tet_mesh.h"
 #include "study/command_line.h"
+#include "study/impacts.h"
 #include "study/plot.h"
 #include "study/results_directory.h"
 #include "study/run_suite.h"
@@ -75,15 +76,18 @@ Status execute(const PlotCommand& command) {
 }
 
 Status execute(const StabilityCommand& command) {
-  constexpr Real flight = 2, chain = 10;  // [s]
+  constexpr Real flight = 2, chain = 10, impact = 4;  // [s]
   StabilityTable table;
+  ImpactTable impacts;
   {
-    demo::Progress progress("stability", 1000);
+    demo::Progress progress("stability", 2000);
     table = measure_stability(command.time.value_or(flight), command.time.value_or(chain),
                               [&](Real share) { progress.advance_to(static_cast<long>(1000 * share)); });
+    impacts = measure_impacts(command.time.value_or(impact),
+                              [&](Real share) { progress.advance_to(static_cast<long>(1000 * (1 + share))); });
   }
-  std::cout << table.text() << std::flush;
-  if (table.is_stable()) return done;
+  std::cout << table.text() << '\n' << impacts.text() << std::flush;
+  if (table.is_stable() && impacts.is_stable()) return done;
   std::cerr << "penalty-study: a step was not finite, or energy was gained\n";
   return failed;
 }
