@@ -30,7 +30,7 @@ struct Problem {
     system.matrix.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(x.cols(), 1));
   }
 
-  // Two rigid bodies, one between the particles and the other, and contacts of this stiffness.
+  // Two rigid bodies, one between the particles and the other, and contacts of all of them of this stiffness.
   void add_rigid_bodies(unsigned seed, Real stiffness) {
     Random random(seed);
     const auto positive = [&random] {
@@ -40,12 +40,20 @@ struct Problem {
     const int first = static_cast<int>(x.cols()), second = first + 2;
     system.rigid_bodies = {{positive(), positive()}, {positive(), positive()}};
     b = random_packed(second + 2, 1, random);
-    for (int k = 0; k < 6; ++k) {
+    for (int k = 0; k < 2; ++k) {  // of the particles among themselves, one of which is on both sides
       ContactSides sides;
+      sides.add({{k, k + 7, k + 12, k + 20}, {0.4, 0.3, 0.2, 0.1}, 4}, 1);
+      sides.add({{k + 3, k + 7, k + 25}, {0.5, 0.2, 0.3}, 3}, -1);
+      EXPECT_EQ(sides.num_particles, 6);
+      system.contacts.push_back({sides, stiffness * positive()});
+    }
+    for (int k = 0; k < 7; ++k) {
+      ContactSides sides;
+      sides.turn = k == 6;
       sides.rigid[0] = {.column = k % 2 == 0 ? first : second, .sign = -1, .arm = random.vectors<1>(1, 1)};
       sides.num_rigid = 1;
       if (k < 4)
-        sides.point = {{k, k + 7, k + 12}, {0.5, 0.3, 0.2}, 3};
+        sides.add({{k, k + 7, k + 12}, {0.5, 0.3, 0.2}, 3}, 1);
       else
         sides.rigid[sides.num_rigid++] = {.column = k % 2 == 0 ? second : first, .sign = 1, .arm = {0.3, -1, 0.2}};
       system.contacts.push_back({sides, stiffness * positive()});
@@ -63,13 +71,14 @@ struct Problem {
     }
     for (const auto& [sides, stiffness] : system.contacts) {
       Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(3, a.cols());
-      for (int k = 0; k < sides.point.size; ++k)
-        jacobian.middleCols<3>(3 * sides.point.particles[k]).diagonal().setConstant(sides.point.weights[k]);
+      for (int k = 0; k < sides.num_particles; ++k)
+        jacobian.middleCols<3>(3 * sides.particles[k]).diagonal().setConstant(sides.weights[k]);
       for (int k = 0; k < sides.num_rigid; ++k) {
         const auto& [column, sign, arm] = sides.rigid[k];
-        jacobian.middleCols<3>(3 * column).diagonal().setConstant(sign);
+        jacobian.middleCols<3>(3 * column).diagonal().setConstant(sides.turn ? 0 : sign);
         for (int axis = 0; axis < 3; ++axis)
-          jacobian.col(3 * column + 3 + axis) = sign * Vector3::Unit(axis).cross(arm);
+          jacobian.col(3 * column + 3 + axis) =
+              sign * (sides.turn ? Vector3::Unit(axis) : Vector3::Unit(axis).cross(arm));
       }
       a += jacobian.transpose() * stiffness * jacobian;
     }

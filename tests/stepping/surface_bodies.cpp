@@ -35,6 +35,7 @@ Body& SurfaceBodies::add(PotentialField field, const Eigen::Matrix3Xd& vertices,
   }
   body->body.gravity = gravity;
   body->body.options.damping_time = damping_time;
+  body->body.options.integrator = integrator;
 
   triangles_.push_back(triangles);
   std::vector<int> point_of(count, -1);

@@ -22,6 +22,7 @@ class SurfaceBodies {
   Real friction = 0;
   Vector3 gravity = Vector3::Zero();
   Real damping_time = 0;
+  Integrator integrator = Integrator::automatic;
   std::vector<Real> floors = {};  // heights of planes that look up [m]
 
   /// A body of tetrahedra with equal masses.

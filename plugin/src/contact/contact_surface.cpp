@@ -241,6 +241,11 @@ void ContactSurface::take_velocities(const Vector3& velocity, const Vector3& ang
   measure_patches();
 }
 
+void ContactSurface::take_way_to(const Vector3& origin, const Matrix3& rotation) {
+  const Eigen::AngleAxis<Real> turn(Matrix3(rotation * rotation_.transpose()));
+  take_velocities(origin - origin_, turn.angle() * turn.axis());
+}
+
 Real ContactSurface::bend(Real duration) const {
   const Real angle = duration * angular_velocity_.norm();
   return reach_ * angle * angle / 2;

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 
 #include "implicit_contacts.h"
+#include "implicit_surfaces.h"
 #include "rigid_state.h"
 #include "stepped_body.h"
 
@@ -12,6 +13,7 @@ namespace penalty {
 namespace {
 
 constexpr Real sum_round_off = 1e-12;  // of a sum of forces, relative to the sum of their magnitudes
+constexpr Real least_energy = 1e-300;  // [J]
 constexpr Real round_off2 = 1e-28;     // square of that of positions, relative to the size of the body
 
 // In contact:
@@ -27,12 +29,13 @@ constexpr Real sudden = 5;              // approach [speeds gained by gravity in
 
 }  // namespace
 
-BackwardEuler::BackwardEuler(Island& island, Real duration)
+BackwardEuler::BackwardEuler(Island& island, ImplicitSurfaces* surfaces, Real duration)
     : island_(island),
       body_(*island.bodies.front()),
       particles_(body_.particles),
       state_(body_.implicit),
       newton_(state_.newton),
+      surfaces_(surfaces),
       duration_(duration) {
   if (!newton_.has_pattern_of(*body_.field)) newton_.set_pattern(*body_.field);
   newton_.clear_fixed();
@@ -149,46 +152,101 @@ void BackwardEuler::minimize() {
   }
 }
 
-// Energy of what moves, as it would without forces: the share of the lightest body.
-Real BackwardEuler::kinetic_scale() const {
+// By the energy of each body as it would move without forces, or, if that is more, its share by mass of that of all: what is
+// light does not hide behind what is heavy, nor make it wait.
+void BackwardEuler::find_enough() {
   const Objective& objective = newton_.objective;
-  Real twice = 0, mass = body_.mass, lightest = body_.mass > 0 ? body_.mass : std::numeric_limits<Real>::infinity();
+  std::vector<Real> masses{body_.mass}, twice{0};
   for (int i = 0; i < particles_.size(); ++i)
-    twice += objective.weights[i] * (objective.targets.col(i) - state_.from.col(i)).squaredNorm();
+    twice[0] += objective.weights[i] * (objective.targets.col(i) - state_.from.col(i)).squaredNorm();
   for (Eigen::Index column = particles_.size(); const RigidInertia& inertia : objective.rigid_bodies) {
+    twice.push_back(0);
     for (const Matrix3* block : {&inertia.translation, &inertia.rotation}) {
       const Vector3 way = objective.targets.col(column++).head<3>();
-      twice += way.dot(*block * way);
+      twice.back() += way.dot(*block * way);
     }
-    const Real own = duration_ * duration_ * inertia.translation(0, 0);
-    mass += own;
-    lightest = std::min(lightest, own);
+    masses.push_back(duration_ * duration_ * inertia.translation(0, 0));
   }
-  return mass > 0 ? lightest / mass * twice / 2 : 0;
+  const Real mass = std::accumulate(masses.begin(), masses.end(), Real(0));
+  const Real all = std::accumulate(twice.begin(), twice.end(), Real(0));
+  const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
+  enough_.clear();
+  for (std::size_t k = 0; k < masses.size(); ++k) {
+    const Real share = mass > 0 ? masses[k] / mass * all : 0;
+    enough_.push_back(std::max({tolerance2 * std::max(twice[k], share) / 2, noise(), least_energy}));
+  }
+}
+
+// The largest of a body, by what is enough.
+Real BackwardEuler::residual() {
+  newton_.squared_residual();
+  Real largest = 0;
+  Eigen::Index first = 0, count = particles_.size();
+  for (const Real enough : enough_) {
+    largest = std::max(largest, std::abs(newton_.residual_share(first, count)) / enough);
+    first += count;
+    count = 2;
+  }
+  return largest;
+}
+
+void BackwardEuler::take_surfaces(ImplicitContacts& contacts) {
+  if (surfaces_) {
+    contacts.take_surfaces(newton_.positions());
+    contacts.set_hardness(newton_);
+  }
+  newton_.evaluate_again();
+}
+
+// Where surfaces may touch, what is begun with must be within reach.
+void BackwardEuler::begin_in_contact(ImplicitContacts& contacts) {
+  const Objective& objective = newton_.objective;
+  if (!newton_.has_stiffness()) {
+    newton_.objective.contacts = nullptr;
+    newton_.prepare();
+    newton_.start(guess(state_.from, false));
+    newton_.linearize();
+    newton_.objective.contacts = &contacts;
+  }
+  if (surfaces_) {
+    surfaces_->begin(objective.targets.cols());
+    surfaces_->aim(objective.targets - guess(state_.from, false));
+    contacts.take_surfaces(guess(state_.from, false));
+  }
+  contacts.set_hardness(newton_);
+  choose_start();
+  if (surfaces_) {
+    const PackedVectors start = newton_.positions(), from = guess(state_.from, false);
+    if (surfaces_->aim(start - from) < 1)
+      newton_.start(from);
+    else
+      surfaces_->move(1, start);
+    take_surfaces(contacts);
+  }
+  contacts.predict(objective.targets, sudden * duration_ * body_.gravity.norm());
 }
 
 // By iterations that hold the limits of friction, and updates of these in between.
 void BackwardEuler::minimize_in_contact(ImplicitContacts& contacts) {
-  const Real tolerance2 = body_.options.newton_tolerance * body_.options.newton_tolerance;
-  const Real scale = kinetic_scale();
-  const Real enough = std::max(tolerance2 * scale, noise());
+  find_enough();
   const int most = times_iterations * body_.options.newton_iterations;
   int since_update = 0, updates = 0, age = 0;
   Real fresh_fall = 0;
   bool is_fresh = true;  // linearised here
   newton_.linearize(newton_.may_keep_stiffness(newton_.positions(), stiffness_range()));
-  Real left = newton_.squared_residual(), before = left;
+  Real left = residual(), before = left;
   for (int k = 0;;) {
-    const bool is_balanced = left <= enough;
+    const bool is_balanced = left <= 1;
     if (k > 0 && (is_balanced || since_update >= fewest_between_updates)) {
       const ImplicitContacts::Change change = contacts.limit_change(newton_.positions());
-      const bool is_settled = change.limits <= friction_change * change.sum && change.gap < settled_gap * duration_;
+      const bool is_settled = change.limits <= friction_change * change.sum && change.gap < settled_gap * duration_ &&
+                              contacts.fit(newton_.positions());
       if ((is_settled && is_balanced) || (updates >= most_updates && is_balanced) || k >= most) break;
       ++updates;
       since_update = 0;
       contacts.update(newton_.positions(), is_balanced, settled_gap * duration_);
-      newton_.evaluate_again();
-      left = before = newton_.squared_residual();
+      take_surfaces(contacts);
+      left = before = residual();
     }
     if (k >= most || !std::isfinite(left)) break;
     if (!is_fresh) {
@@ -201,14 +259,15 @@ void BackwardEuler::minimize_in_contact(ImplicitContacts& contacts) {
     }
     is_fresh = false;
     const NewtonIteration iteration = newton_.descend();
-    contacts.follow(iteration.length, newton_.direction());
+    contacts.follow(iteration.length, newton_.direction(), newton_.positions());
     ++k;
     ++since_update;
     ++body_.report.newton_iterations;
     body_.report.linear_iterations += iteration.linear_iterations;
-    before = left;
-    left = newton_.squared_residual();
     if (iteration.length == 0) break;
+    before = left;
+    if (contacts.is_cut()) take_surfaces(contacts);
+    left = residual();
   }
 }
 
@@ -282,9 +341,9 @@ void BackwardEuler::drift_rigid_bodies() {
   }
 }
 
-void BackwardEuler::run() {
+bool BackwardEuler::run() {
   state_.from = particles_.positions;
-  ImplicitContacts contacts(island_, state_.contacts, duration_);
+  ImplicitContacts contacts(island_, state_.contacts, surfaces_, duration_);
   touches_ = !contacts.is_empty();
   newton_.objective.contacts = touches_ ? &contacts : nullptr;
   aim();
@@ -292,16 +351,7 @@ void BackwardEuler::run() {
     choose_start();
     minimize();
   } else {
-    if (!newton_.has_stiffness()) {
-      newton_.objective.contacts = nullptr;
-      newton_.prepare();
-      newton_.start(guess(state_.from, false));
-      newton_.linearize();
-      newton_.objective.contacts = &contacts;
-    }
-    contacts.set_hardness(newton_);
-    choose_start();
-    contacts.predict(newton_.objective.targets, sudden * duration_ * body_.gravity.norm());
+    begin_in_contact(contacts);
     minimize_in_contact(contacts);
   }
   for (RigidBody& rigid : island_.rigid_bodies) rigid.kick(duration_);
@@ -333,6 +383,7 @@ void BackwardEuler::run() {
       newton_.forget_stiffness();
     }
   }
+  return !surfaces_ || surfaces_->end();
 }
 
 }  // namespace penalty

@@ -36,71 +36,9 @@ void add_records(const Island& island, std::vector<ContactRecord>& records) {
   }
 }
 
-}  // namespace
-
-void report_particle_contacts(Island& island) {
-  for (const Contact& contact : island.contacts) {
-    const ContactPlace place = place_of(contact, island);
-    for (const int body : {contact.a.body, contact.b.body}) {
-      if (body < 0) continue;
-      ++island.bodies[body]->report.num_contacts;
-      book_depth(island, body, -place.gap);
-    }
-  }
-}
-
-void find_records(Island& island, const SurfaceContacts& surfaces) {
-  island.records.clear();
-  add_records(island, island.records);
-  surfaces.add_records(island.records);
-}
-
-// Closest points are those of the last sweeps, which were where the step ends.
-void SurfaceContacts::report() {
-  if (is_empty()) return;
-  for (const TouchingPair& pair : scratch_.pairs) {
-    ++island_.bodies[pair.body_a]->report.num_contacts;
-    if (pair.body_b != pair.body_a) ++island_.bodies[pair.body_b]->report.num_contacts;
-    for (const int body : {pair.body_a, pair.body_b}) book_depth(island_, body, -pair.gap);
-  }
-  for (const SurfaceContact& contact : island_.surfaces) report_enclosed(contact);
-  merge_records();
-}
-
-void SurfaceContacts::add_records(std::vector<ContactRecord>& records) const {
-  if (is_empty()) return;
-  for (const TouchingRecord& touching : scratch_.records) records.push_back(record_of(touching));
-}
-
-// Also of what no pair holds: points that are not led out, be it that the particles hold the body that they are of.
-void SurfaceContacts::report_enclosed(const SurfaceContact& contact) {
-  const SurfacePair& pair = *contact.pair;
-  for (const EnclosedPoint& enclosed : std::as_const(pair).enclosed()) {
-    ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
-    const Vector3& x = (enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point);
-    if (!(around.winding_number(x) > 0.5)) continue;
-    const Real depth = around.nearest(x).closest.difference.norm() + pair.kept_distance();
-    for (const int body : {contact.body_a, contact.body_b}) book_depth(island_, body, depth);
-  }
-}
-
-// What lost its number on the way has several records.
-void SurfaceContacts::merge_records() {
-  std::vector<TouchingRecord>& records = scratch_.records;
-  std::ranges::sort(records, {}, [](const TouchingRecord& record) { return record.features.key(); });
-  std::size_t last = 0;
-  for (std::size_t k = 1; k < records.size(); ++k)
-    if (records[last].features.are(records[k].features)) {
-      records[last].given.add(records[k].given);
-    } else {
-      records[++last] = records[k];
-    }
-  if (!records.empty()) records.resize(last + 1);
-}
-
-ContactRecord SurfaceContacts::record_of(const TouchingRecord& touching) const {
+ContactRecord record_of(const Island& island, const TouchingRecord& touching) {
   const TouchingFeatures& features = touching.features;
-  const SurfaceContact& contact = island_.surfaces[features.contact];
+  const SurfaceContact& contact = island.surfaces[features.contact];
   const SurfacePair& pair = *contact.pair;
   FeaturePair q{.points = features.points, .are_edges = features.are_edges, .from_b = features.from_b};
   const ContactSurface &one = pair.first(q), &two = pair.second(q);
@@ -112,7 +50,7 @@ ContactRecord SurfaceContacts::record_of(const TouchingRecord& touching) const {
     (k < size_of_first ? at_first : at_second) +=
         std::abs(closest.weights[k]) * (k < size_of_first ? one : two).position(q.points[k]);
 
-  ContactRecord record = penalty::record_of(touching.given);
+  ContactRecord record = record_of(touching.given);
   const int of_first = q.from_b ? contact.body_b : contact.body_a;
   record.body = of_first >= 0 ? of_first : contact.body_a;
   record.other_body = q.from_b ? contact.body_a : contact.body_b;
@@ -128,9 +66,70 @@ ContactRecord SurfaceContacts::record_of(const TouchingRecord& touching) const {
   return record;
 }
 
-TouchingFeatures SurfaceContacts::features_of(const SurfaceContact& contact, const FeaturePair& q,
-                                              bool is_enclosed) const {
-  return {.contact = static_cast<int>(&contact - island_.surfaces.data()),
+}  // namespace
+
+void report_particle_contacts(Island& island) {
+  for (const Contact& contact : island.contacts) {
+    const ContactPlace place = place_of(contact, island);
+    for (const int body : {contact.a.body, contact.b.body}) {
+      if (body < 0) continue;
+      ++island.bodies[body]->report.num_contacts;
+      book_depth(island, body, -place.gap);
+    }
+  }
+}
+
+void find_records(Island& island) {
+  island.records.clear();
+  add_records(island, island.records);
+  if (island.surfaces.empty() || !island.surface_scratch) return;
+  for (const TouchingRecord& touching : island.surface_scratch->records)
+    island.records.push_back(record_of(island, touching));
+}
+
+// Closest points are those of the last sweeps, which were where the step ends.
+void SurfaceContacts::report() {
+  if (is_empty()) return;
+  scratch_.num_touching = static_cast<int>(scratch_.pairs.size());
+  for (const TouchingPair& pair : scratch_.pairs) book_touching(island_, pair.body_a, pair.body_b, -pair.gap);
+  for (const SurfaceContact& contact : island_.surfaces) report_enclosed(contact);
+  merge(scratch_.records);
+}
+
+// Also of what no pair holds: points that are not led out, be it that the particles hold the body that they are of.
+void SurfaceContacts::report_enclosed(const SurfaceContact& contact) {
+  const SurfacePair& pair = *contact.pair;
+  for (const EnclosedPoint& enclosed : std::as_const(pair).enclosed()) {
+    ContactSurface& around = enclosed.of_b ? pair.a() : pair.b();
+    const Vector3& x = (enclosed.of_b ? pair.b() : pair.a()).position(enclosed.point);
+    if (!(around.winding_number(x) > 0.5)) continue;
+    const Real depth = around.nearest(x).closest.difference.norm() + pair.kept_distance();
+    for (const int body : {contact.body_a, contact.body_b}) book_depth(island_, body, depth);
+  }
+}
+
+void book_touching(const Island& island, int body_a, int body_b, Real depth) {
+  for (const int body : {body_a, body_b == body_a ? -1 : body_b}) {
+    if (body >= 0) ++island.bodies[body]->report.num_contacts;
+    book_depth(island, body, depth);
+  }
+}
+
+void merge(std::vector<TouchingRecord>& records) {
+  std::ranges::sort(records, {}, [](const TouchingRecord& record) { return record.features.key(); });
+  std::size_t last = 0;
+  for (std::size_t k = 1; k < records.size(); ++k)
+    if (records[last].features.are(records[k].features)) {
+      records[last].given.add(records[k].given);
+    } else {
+      records[++last] = records[k];
+    }
+  if (!records.empty()) records.resize(last + 1);
+}
+
+TouchingFeatures features_of(const Island& island, const SurfaceContact& contact, const FeaturePair& q,
+                             bool is_enclosed) {
+  return {.contact = static_cast<int>(&contact - island.surfaces.data()),
           .points = q.points,
           .are_edges = q.are_edges,
           .from_b = q.from_b,

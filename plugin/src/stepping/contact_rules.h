@@ -10,6 +10,8 @@ inline constexpr Real recovery_time = 0.05;  // in which depth is taken back [s]
 inline constexpr Real recovery_speed = 0.5;  // no faster than this [m/s]
 /// Between bodies that can move, against whatever presses them together, nothing gathers speed faster than this [m/s²].
 inline constexpr Real recovery_acceleration = 100;
+/// The same of the thickness that surfaces lost [m/s], and the share of it that they may lose.
+inline constexpr Real lost_thickness_speed = 0.02, lost_share = 0.02;
 
 /// The speed at which depth [m], beyond what is left alone, is taken back in a drift of h [s].
 inline Real recovery_of(Real depth, Real left_alone, Real h) {

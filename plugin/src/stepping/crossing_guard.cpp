@@ -11,17 +11,10 @@
 namespace penalty {
 namespace {
 
-constexpr Real kept_share = 0.1;  // of the distance, or of the thickness, that a drift must leave
 constexpr Real unknown_reach = std::numeric_limits<Real>::infinity();
 constexpr Real no_moment = 1e-13;                                 // of inertia, relative to the largest
 constexpr int extra_sweeps = 8;                                   // before what fails is frozen
 constexpr long most_tests = 20000, most_tests_of_particle = 100;  // of pairs, for zones, in a step
-
-// Least distance along n of points of the first feature from those of the second.
-Real separation(const Vector3& n, const std::array<Vector3, 4>& x, bool are_edges) {
-  const Real s[] = {n.dot(x[0]), n.dot(x[1]), n.dot(x[2]), n.dot(x[3])};
-  return are_edges ? std::min(s[0], s[1]) - std::max(s[2], s[3]) : s[0] - std::max({s[1], s[2], s[3]});
-}
 
 }  // namespace
 
@@ -46,7 +39,7 @@ void SurfaceContacts::guard(Real h, Real remaining, const RigidSweep& rigid_swee
       freeze(h);
       if (is_beyond_help()) return;
     }
-    take_velocities();
+    surfaces_.take_velocities();
   }
 }
 
@@ -60,43 +53,9 @@ void SurfaceContacts::find_failing(Real h) {
   for (const SurfaceContact& contact : island_.surfaces)
     contact.pair->visit_near([&](FeaturePair& q, Real reach) {
       const FailingPair pair{&contact, &q};
-      if (!(!zone_.empty() && is_in_one_zone(pair)) && !is_safe(contact, q, h, reach)) scratch_.failing.push_back(pair);
+      if (!(!zone_.empty() && is_in_one_zone(pair)) && contact.pair->separated_share(q, h, reach) < 1)
+        scratch_.failing.push_back(pair);
     });
-}
-
-// Two features that come together by less than what is between them have a plane between them all the time, and so have
-// those of which no point moves so far against one of them. `reach`: what the distance can change by.
-bool SurfaceContacts::is_safe(const SurfaceContact& contact, FeaturePair& q, Real h, Real reach) const {
-  const SurfacePair& surfaces = *contact.pair;
-  surfaces.find_difference(q);
-  const Real distance = q.distance;
-  if (surfaces.has_no_direction(q, distance)) return true;
-  const Real radius = surfaces.b().radius(), bend = surfaces.b().bend(h);
-  const Real kept = std::min(
-      distance, std::max(radius + kept_share * std::min(std::max<Real>(distance - radius, 0), q.thickness - radius),
-                         2 * surfaces.least_distance(q)));
-  if (reach + bend < distance - kept) return true;
-  const ContactSurface &one = surfaces.first(q), &two = surfaces.second(q);
-  const auto surface_of = [&](int k) -> const ContactSurface& { return k < (q.are_edges ? 2 : 1) ? one : two; };
-  std::array<Vector3, 4> v;
-  for (int k = 0; k < 4; ++k) v[k] = surface_of(k).velocity(q.points[k]);
-  Real relative2 = 0;
-  for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
-  if (2 * h * std::sqrt(relative2) < distance - kept) return true;
-  std::array<Vector3, 4> start, x;
-  for (int k = 0; k < 4; ++k) {
-    start[k] = surface_of(k).position(q.points[k]);
-    x[k] = start[k] + h * v[k];
-  }
-  if (separation(q.difference / distance, start, q.are_edges) > 0 &&
-      separation(q.difference / distance, x, q.are_edges) >= kept + bend)
-    return true;
-  const Vector3 after = (q.are_edges ? closest_points_of_edges(x[0], x[1], x[2], x[3])
-                                     : closest_points_of_triangle(x[0], x[1], x[2], x[3]))
-                            .difference;
-  const Real distance_after = after.norm();
-  return distance_after >= kept + bend && distance_after > 0 &&
-         separation(after / distance_after, start, q.are_edges) > 0;
 }
 
 template <class Visit>
@@ -183,11 +142,12 @@ void SurfaceContacts::freeze(Real h) {
       for (const int particle : members[zone])
         again.insert(again.end(), pairs_of[particle].begin(), pairs_of[particle].end());
     }
-    take_velocities();
+    surfaces_.take_velocities();
     freezing_tests_ += static_cast<long>(again.size());
     if (is_beyond_help()) return;
     for (const FailingPair& pair : again)
-      if (!is_in_one_zone(pair) && !is_safe(*pair.contact, *pair.features, h, unknown_reach)) failing.push_back(pair);
+      if (!is_in_one_zone(pair) && pair.contact->pair->separated_share(*pair.features, h, unknown_reach) < 1)
+        failing.push_back(pair);
   }
 }
 
@@ -242,7 +202,7 @@ void SurfaceContacts::join(std::span<const int> numbers, std::span<const std::ve
   make_rigid(numbers);
   const FeaturePair& q = *link->features;
   const Vector3 given = (momentum() - before) * (a_is_held != q.from_b ? -1 : 1);  // to the first feature
-  record(features_of(contact, q, false), q.thickness, given);
+  record(features_of(island_, contact, q), q.thickness, given);
 }
 
 // What is held holds the rest, and does the work.

@@ -212,7 +212,7 @@ class SubCycle {
   }
 
   bool settle(Real duration) {
-    find_records(island_, surfaces_);
+    find_records(island_);
     return penalty::settle(island_, duration);
   }
 
@@ -371,7 +371,7 @@ void advance_explicitly(Island& island, Real duration) {
   }
   report_particle_contacts(island);
   surfaces.report();
-  find_records(island, surfaces);
+  find_records(island);
   if (!step.finite) {
     island.records.clear();
     name_bad_particles(island.bodies);

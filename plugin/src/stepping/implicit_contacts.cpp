@@ -39,16 +39,18 @@ Real mobility_of(const RigidBody* body, const Vector3& arm, const Vector3& direc
 
 }  // namespace
 
-ImplicitContacts::ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, Real duration)
-    : island_(island), body_(*island.bodies.front()), duration_(duration) {
+ImplicitContacts::ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, ImplicitSurfaces* surfaces,
+                                   Real duration)
+    : island_(island), body_(*island.bodies.front()), duration_(duration), surfaces_(surfaces) {
   rows_.reserve(island.contacts.size() + island.rigid_contacts.size());
   for (Contact& contact : island.contacts) {
     const ContactPlace place = place_of(contact, island);
     Row row{.contact = &contact, .b = &island.rigid_bodies[contact.b.rigid]};
     row.arm_b = place.at - row.b->position;
-    row.sides.point = contact.a.point;
+    row.sides.add(contact.a.point, 1);
     row.normal = place.normal;
-    row.start = place.at;
+    row.start = row.place = place.at;
+    row.soft_sign = 1;
     row.friction = contact.friction;
     if (const RememberedContact* known = find(memory, contact.a.point, row.normal)) start(row, known->force);
     add(row, place.gap, contact.deepest, contact.radius == 0);
@@ -61,8 +63,11 @@ ImplicitContacts::ImplicitContacts(Island& island, std::vector<RememberedContact
     row.normal = place.normal;
     row.friction = contact.friction;
     if (!contact.force.isZero(0)) start(row, contact.force);
+    const auto place_of_row = static_cast<int>(rows_.size());
     add(row, place.gap, std::numeric_limits<Real>::infinity(), contact.radius == 0);
+    if (static_cast<int>(rows_.size()) > place_of_row) add_turning(contact, place_of_row);
   }
+  first_of_surfaces_ = rows_.size();
 }
 
 // From what it gave in the last step [N].
@@ -73,9 +78,30 @@ void ImplicitContacts::start(Row& row, const Vector3& force) {
   row.is_new = false;
 }
 
+// Against rolling, and about the normal.
+void ImplicitContacts::add_turning(const RigidContact& contact, int presser) {
+  for (const bool about : {false, true}) {
+    Row row = rows_[presser];
+    row.presser = presser;
+    row.friction = about ? contact.spinning : contact.rolling;
+    if (!(row.friction > 0)) continue;
+    const Matrix3 along = row.normal * row.normal.transpose();
+    row.across = about ? along : Matrix3(Matrix3::Identity() - along);
+    row.sides.turn = true;
+    row.pressing = 0;
+    row.way.setZero();
+    for (const auto& [body, sign] : {std::pair(row.a, 1), std::pair(row.b, -1)})
+      if (!body->is_dynamic()) row.way -= sign * duration_ * body->angular_velocity;
+    row.driven = row.way;
+    row.limit = row.friction * rows_[presser].pressing;
+    row.rubbing = no_longer_than(row.limit, row.across * contact.moment);
+    rows_.push_back(row);
+  }
+}
+
 // With what is left of it: the rigid bodies.
 void ImplicitContacts::add(Row row, Real gap, Real deepest, bool bends) {
-  bool moves = row.sides.point.size > 0 && row.sides.point.mobility(body_.particles.inverse_masses) > 0;
+  bool moves = is_any_free(row.sides);
   int column = body_.particles.size();
   for (RigidBody& body : island_.rigid_bodies) {
     for (const auto& [side, arm, sign] : {std::tuple(row.a, row.arm_a, 1), std::tuple(row.b, row.arm_b, -1)}) {
@@ -94,7 +120,13 @@ void ImplicitContacts::add(Row row, Real gap, Real deepest, bool bends) {
   // Depth comes back no faster than is good, and what is too deep stays.
   const Real depth = std::max<Real>(-gap, 0), recovered = depth <= deepest ? recovery_speed * duration_ : 0;
   row.gap = gap + std::max<Real>(depth - recovered, 0);
+  row.across = Matrix3::Identity() - row.normal * row.normal.transpose();
   rows_.push_back(row);
+}
+
+bool ImplicitContacts::is_any_free(const ContactSides& sides) const {
+  return std::any_of(sides.particles.begin(), sides.particles.begin() + sides.num_particles,
+                     [this](int i) { return body_.particles.inverse_masses[i] > 0; });
 }
 
 // Of a point at `arm` from the centre of a body: of one that takes no impulse, by drifting; of another what is beyond the
@@ -110,40 +142,49 @@ Vector3 ImplicitContacts::way_of(const RigidBody& body, const Vector3& arm, bool
 // Points that share particles, as those of an embedded surface do, share what these give way by.
 void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
   const auto visit_free = [this](const Row& row, const auto& visit) {
-    const WeightedPoint& point = row.sides.point;
-    for (int k = 0; k < point.size; ++k)
-      if (body_.particles.inverse_masses[point.particles[k]] > 0)
-        visit(point.particles[k], point.weights[k] * point.weights[k]);
+    const ContactSides& sides = row.sides;
+    for (int k = 0; k < sides.num_particles; ++k)
+      if (body_.particles.inverse_masses[sides.particles[k]] > 0)
+        visit(sides.particles[k], sides.weights[k] * sides.weights[k]);
   };
   shares_.assign(body_.particles.inverse_masses.size(), 0);
   for (const Row& row : rows_) visit_free(row, [this](int particle, Real weight2) { shares_[particle] += weight2; });
   const bool is_free = newton.fixed().empty();
   for (Row& row : rows_) {
+    if (row.presser >= 0) {
+      const Matrix3 mobility = row.across * (row.a->inverse_inertia + row.b->inverse_inertia) * row.across;
+      row.hardness = row.hardening * hardness_share * row.across.trace() / (duration_ * duration_ * mobility.trace());
+      continue;
+    }
     Real mobility = mobility_of(row.a, row.arm_a, row.normal) + mobility_of(row.b, row.arm_b, row.normal);
-    if (row.contact && is_free) mobility += 1 / body_.mass;
+    if (row.soft_sign != 0 && is_free) mobility += 1 / body_.mass;
     Real softness = duration_ * duration_ * mobility;
     visit_free(row, [&](int particle, Real weight2) {
       softness += 3 * weight2 * std::max<Real>(shares_[particle], 1) / newton.stiffness_of(particle).trace();
     });
-    row.hardness = hardness_share / softness;
+    row.hardness = row.hardening * hardness_share / softness;
   }
 }
 
 void ImplicitContacts::predict(const PackedVectors& targets, Real negligible_speed) {
-  for (Row& row : rows_) {
-    const Vector3 way = moved(row, targets);
-    row.is_predicted = row.is_new && -row.normal.dot(way) > negligible_speed * duration_ && gap_of(row, way) < 0;
-  }
+  targets_ = &targets;
+  negligible_speed_ = negligible_speed;
+  for (Row& row : rows_) predict(row);
+}
+
+void ImplicitContacts::predict(Row& row) const {
+  if (!row.is_new || row.presser >= 0 || !targets_) return;
+  const Vector3 way = moved(row, *targets_);
+  row.is_predicted = -row.normal.dot(way) > negligible_speed_ * duration_ && gap_of(row, way) < 0;
 }
 
 ImplicitContacts::Force ImplicitContacts::force_of(const Row& row, const Vector3& moved) const {
   Force result{Vector3::Zero(), 0, 0, 0};
-  result.pressing = std::max<Real>(row.pressing - row.hardness * gap_of(row, moved), 0);
+  if (row.presser < 0) result.pressing = std::max<Real>(row.pressing - row.hardness * gap_of(row, moved), 0);
   result.force = result.pressing * row.normal;
   result.energy = (result.pressing * result.pressing - row.pressing * row.pressing) / (2 * row.hardness);
   if (!(row.limit > 0)) return result;
-  const Vector3 slip = moved - row.normal.dot(moved) * row.normal;
-  const Vector3 wanted = row.rubbing - row.hardness * slip;
+  const Vector3 wanted = row.rubbing - row.hardness * (row.across * moved);
   const Real size = wanted.norm();
   result.rubbing_share = size > row.limit ? row.limit / size : 1;
   result.force += result.rubbing_share * wanted;
@@ -157,7 +198,7 @@ Real ImplicitContacts::evaluate(const PackedVectors& x, PackedVectors& gradient)
   for (const Row& row : rows_) {
     const Force given = force_of(row, moved(row, x));
     energy += given.energy;
-    if (!given.force.isZero(0)) row.sides.add(-given.force, gradient);
+    if (!given.force.isZero(0)) row.sides.push(-given.force, gradient);
   }
   return energy;
 }
@@ -168,31 +209,35 @@ void ImplicitContacts::linearize(const PackedVectors& x, std::vector<ContactStif
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
     row.force = given.force;
-    const Matrix3 along = row.normal * row.normal.transpose();
     Real pressed = given.pressing > 0 ? row.hardness : 0;
     if (row.is_predicted && pressed == 0) {
       const Vector3 pull = (row.pressing - row.hardness * gap_of(row, way)) * row.normal;
-      row.sides.add(pull, forces);
+      row.sides.push(pull, forces);
       row.force += pull;
       pressed = row.hardness;
     }
     row.is_predicted = false;
-    row.stiffness = pressed * along + row.hardness * given.rubbing_share * (Matrix3::Identity() - along);
+    row.stiffness = pressed * row.normal * row.normal.transpose() + row.hardness * given.rubbing_share * row.across;
     if (pressed > 0 || given.rubbing_share > 0) stiffness.push_back({row.sides, row.stiffness});
   }
 }
 
-void ImplicitContacts::follow(Real length, const PackedVectors& direction) {
-  for (Row& row : rows_)
-    row.linear_pressing = row.normal.dot(row.force - length * (row.stiffness * row.sides.distance(direction)));
+void ImplicitContacts::follow(Real length, const PackedVectors& direction, const PackedVectors& x) {
+  for (Row& row : rows_) {
+    const Vector3 way = length * row.sides.distance(direction);
+    row.linear_pressing = row.normal.dot(row.force - row.stiffness * way);
+  }
+  if (surfaces_) surfaces_->move(length, x);
 }
 
 ImplicitContacts::Change ImplicitContacts::limit_change(const PackedVectors& x) const {
   Change change;
   for (const Row& row : rows_) {
-    const Real limit = row.friction * std::max<Real>(row.linear_pressing, 0);
-    change.limits += std::abs(limit - row.limit);
-    change.sum += limit;
+    const Real limit = row.friction * std::max<Real>(pressing_of_limit(row), 0);
+    if (row.presser < 0) {
+      change.limits += std::abs(limit - row.limit);
+      change.sum += limit;
+    }
     const Vector3 way = moved(row, x);
     if (force_of(row, way).pressing > 0) change.gap = std::max(change.gap, std::abs(gap_of(row, way)));
   }
@@ -203,10 +248,13 @@ void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settl
   for (Row& row : rows_) {
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
-    row.limit = row.friction * std::max<Real>(row.linear_pressing, 0);
+    row.limit = row.friction * std::max<Real>(pressing_of_limit(row), 0);
     if (!converged) continue;
     const Real gap = given.pressing > 0 ? std::abs(gap_of(row, way)) : 0;
-    if (gap > settled_gap && gap > enough_less * row.last_gap) row.hardness *= hardening;
+    if (gap > settled_gap && gap > enough_less * row.last_gap) {
+      row.hardness *= hardening;
+      row.hardening *= hardening;
+    }
     row.last_gap = gap;
     row.pressing = given.pressing;
     row.rubbing = no_longer_than(row.limit, given.force - given.pressing * row.normal);
@@ -215,27 +263,47 @@ void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settl
 
 void ImplicitContacts::finish(const PackedVectors& x, std::vector<RememberedContact>& memory) {
   memory.clear();
-  for (const Row& row : rows_) {
+  for (Row& row : rows_) {
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
-    if (row.rigid) row.rigid->force = given.force;
+    row.force = given.force;
+    if (row.presser >= 0) {
+      give_moment(row, given.force, way);
+      continue;
+    }
+    if (row.rigid) {
+      row.rigid->force = given.force;
+      row.rigid->moment.setZero();
+    }
     if (given.force.isZero(0)) continue;
     const Vector3 impulse = duration_ * given.force;
-    touch_immovable_ = touch_immovable_ || !row.b->is_dynamic() || (row.a && !row.a->is_dynamic());
+    for (const RigidBody* body : {row.a, row.b}) touch_immovable_ = touch_immovable_ || (body && !body->is_dynamic());
     // What a contact does against its obstacle is loss; the other way, depth comes back, or its multipliers were too much.
     outside_work_ += given.force.dot(row.driven) + std::max<Real>(given.force.dot(way), 0);
     if (row.a && row.a->is_dynamic()) row.a->give(impulse, row.arm_a.cross(impulse));
-    if (row.b->is_dynamic()) row.b->give(-impulse, -row.arm_b.cross(impulse));
-    if (!row.contact) continue;
+    if (row.b && row.b->is_dynamic()) row.b->give(-impulse, -row.arm_b.cross(impulse));
+    work_ += given.force.dot(row.sides.distance_of_particles(x) - row.start);
+    if (row.rigid) continue;
+    impulse_ += row.soft_sign * impulse;
+    moment_ += row.soft_sign * row.place.cross(impulse);
     const Vector3 rubbed = given.force - given.pressing * row.normal;
-    work_ += given.force.dot(row.sides.point.of(x) - row.start);
-    impulse_ += impulse;
-    moment_ += row.start.cross(impulse);
-    row.contact->given.add(row.normal, duration_ * given.pressing, duration_ * rubbed,
-                           is_at_limit(rubbed.norm(), row.friction * given.pressing));
-    memory.push_back({row.sides.point.particles, row.normal, given.force});
+    const bool slides = is_at_limit(rubbed.norm(), row.friction * given.pressing);
+    ContactImpulse sum;
+    (row.contact ? row.contact->given : sum).add(row.normal, duration_ * given.pressing, duration_ * rubbed, slides);
+    if (row.contact)
+      memory.push_back({row.contact->a.point.particles, row.normal, given.force});
+    else
+      island_.surface_scratch->records.push_back({row.features, row.thickness, sum});
   }
   std::ranges::sort(memory, {}, &RememberedContact::particles);
+  remember_features();
+}
+
+void ImplicitContacts::give_moment(const Row& row, const Vector3& moment, const Vector3& way) {
+  row.rigid->moment += moment;
+  outside_work_ += moment.dot(row.driven) + std::max<Real>(moment.dot(way), 0);
+  if (row.a->is_dynamic()) row.a->give(Vector3::Zero(), duration_ * moment);
+  if (row.b->is_dynamic()) row.b->give(Vector3::Zero(), -duration_ * moment);
 }
 
 }  // namespace penalty

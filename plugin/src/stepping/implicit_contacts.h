@@ -4,17 +4,20 @@
 #include <span>
 #include <vector>
 
-#include "penalty/stepping/island.h"
+#include "implicit_surfaces.h"
 #include "penalty/stepping/linear_solver.h"
+#include "surface_contacts.h"
 
 namespace penalty {
 
-/// Contacts of one soft body with rigid ones, and of these with each other, as a potential over a step of h. The gap is taken
-/// linear in the unknowns, with the normal of where the step begins,
+/// Contacts of one soft body with rigid ones and with itself, and of rigid ones with each other, as a potential over a step
+/// of h. The gap is taken linear in the unknowns,
 ///
 ///     g(x) = g0 + n . (J (x - x0) - u),   s(x) = (1 - n nᵀ) (J (x - x0) - u),
 ///
-/// J as in ContactSides, u the way in the step, there, of what takes no impulse. The contact is pressed by
+/// J as in ContactSides, u the way in the step, there, of what takes no impulse. What resists turning has s alone. The normal n is that of where the step
+/// begins; that of two features of surfaces, and their closest points, are those of where they were `taken` last, which is
+/// done anew when the iterations have led far from there, or might lead through each other. The contact is pressed by
 /// f = max(0, l - rho g), and rubbed by -rho s, shortened to a limit that is held while Newton's method iterates: an energy
 /// with a continuous derivative, convex. The limit is what the linear model of the last iteration presses, times the
 /// coefficient of friction; its stiffness at the limit is a secant, which is never less than the energy's. The multipliers
@@ -25,9 +28,13 @@ namespace penalty {
 /// a whole: more would be met by no motion of the bodies.
 class ImplicitContacts {
  public:
-  ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, Real duration);
+  /// `surfaces`: those that may touch in this step; null: none.
+  ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, ImplicitSurfaces* surfaces, Real duration);
 
-  bool is_empty() const { return rows_.empty(); }
+  bool is_empty() const { return rows_.empty() && !surfaces_; }
+
+  /// Takes contacts of surfaces as they are at `x`, where these are, too.
+  void take_surfaces(const PackedVectors& x);
 
   /// Sets rho, from the diagonal blocks of the stiffness, inertia included.
   void set_hardness(const NewtonSolver& newton);
@@ -42,8 +49,15 @@ class ImplicitContacts {
   /// Adds the stiffness at `x`, and what is predicted to `forces`.
   void linearize(const PackedVectors& x, std::vector<ContactStiffness>& stiffness, PackedVectors& forces);
 
-  /// After a step of this length along `direction`: what contacts press by their linear model.
-  void follow(Real length, const PackedVectors& direction);
+  /// Which share of this way may be gone without a look at what is met.
+  Real longest(const PackedVectors& direction);
+
+  /// After a step of this length along `direction`, to `x`: what contacts press by their linear model.
+  void follow(Real length, const PackedVectors& direction, const PackedVectors& x);
+
+  /// Whether `longest` has cut the last step, and whether surfaces are still as they were taken, nearly.
+  bool is_cut() const { return is_cut_; }
+  bool fit(const PackedVectors& x);
 
   struct Change {
     Real limits = 0, sum = 0;  // of the limits of friction, and their sum [N]
@@ -71,16 +85,23 @@ class ImplicitContacts {
  private:
   struct Row {
     Contact* contact = nullptr;            // of the soft body; else
-    RigidContact* rigid = nullptr;         // between rigid ones
+    RigidContact* rigid = nullptr;         // between rigid ones; else
+    TouchingFeatures features = {};        // of surfaces
+    Real thickness = 0, kept = 0;          // distance that these keep, and that in this step [m]
     RigidBody *a = nullptr, *b = nullptr;  // rigid bodies of the sides; null: none
     Vector3 arm_a = Vector3::Zero(), arm_b = Vector3::Zero();
     ContactSides sides = {};
     Vector3 normal = Vector3::Zero();
+    Matrix3 across = Matrix3::Zero();  // onto the directions of friction
+    int presser = -1;  // the row whose pressing limits this one, which resists turning; -1: presses itself
     Vector3 start = Vector3::Zero();   // J x0
+    Vector3 place = Vector3::Zero();   // where impulses have their moments
+    Real soft_sign = 0;                // of the impulse on the soft body
     Vector3 way = Vector3::Zero();     // u
     Vector3 driven = Vector3::Zero();  // of that, what something outside does the work of
     Real gap = 0;                      // g0
     Real hardness = 0, friction = 0, limit = 0;
+    Real hardening = 1;                                     // of it, in this step
     Real last_gap = std::numeric_limits<Real>::infinity();  // when multipliers were taken [m]
     Real pressing = 0;                                      // l
     Vector3 rubbing = Vector3::Zero();                      // its part across the normal
@@ -97,6 +118,16 @@ class ImplicitContacts {
   };
   void add(Row row, Real gap, Real deepest, bool bends);
   void start(Row& row, const Vector3& force);
+  void add_turning(const RigidContact& contact, int presser);
+  Real pressing_of_limit(const Row& row) const { return (row.presser < 0 ? row : rows_[row.presser]).linear_pressing; }
+  void predict(Row& row) const;
+  void add(const SurfaceContact& contact, FeaturePair& q, Real reach, const PackedVectors& x);
+  Real kept_distance(const SurfaceContact& contact, const FeaturePair& q) const;
+  static const Row* row_of(std::span<const Row> rows, const TouchingFeatures& features);
+  std::span<const Row> rows_of_surfaces() const { return std::span(rows_).subspan(first_of_surfaces_); }
+  bool is_any_free(const ContactSides& sides) const;
+  void give_moment(const Row& row, const Vector3& moment, const Vector3& way);
+  void remember_features();
   Vector3 way_of(const RigidBody& body, const Vector3& arm, bool bends) const;
   Vector3 moved(const Row& row, const PackedVectors& x) const { return row.sides.distance(x) - row.start - row.way; }
   Force force_of(const Row& row, const Vector3& moved) const;
@@ -105,7 +136,12 @@ class ImplicitContacts {
   Island& island_;
   const SteppedBody& body_;
   Real duration_;
-  std::vector<Row> rows_;
+  ImplicitSurfaces* surfaces_;
+  std::vector<Row> rows_, old_rows_;  // those of surfaces come last, by their features
+  std::size_t first_of_surfaces_ = 0;
+  const PackedVectors* targets_ = nullptr;  // of predictions
+  Real negligible_speed_ = 0;
+  bool is_cut_ = false;
   std::vector<Real> shares_;  // of each particle: sum of squared weights in all points
   Vector3 impulse_ = Vector3::Zero(), moment_ = Vector3::Zero();
   Real work_ = 0, outside_work_ = 0;

@@ -1,9 +1,11 @@
 #include "implicit_step.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "backward_euler.h"
 #include "energy_guard.h"
+#include "implicit_surfaces.h"
 #include "particle_contacts.h"
 #include "restitution.h"
 #include "rigid_contacts.h"
@@ -18,7 +20,7 @@ constexpr Real growth_noise = 1e-12;        // relative growth of energy that is
 
 }  // namespace
 
-void advance_implicitly(Island& island, Real duration) {
+void advance_implicitly(Island& island, ImplicitSurfaces* surfaces, Real duration) {
   SteppedBody& body = *island.bodies.front();
   island.rigid_start = island.rigid_bodies;
   const Real start_energy = begin_step(body);
@@ -38,14 +40,17 @@ void advance_implicitly(Island& island, Real duration) {
     island.rigid_bodies = island.rigid_start;
     body.implicit.newton.forget_stiffness();
     body.implicit.contacts = body.implicit.contacts_at_start;
+    if (surfaces) surfaces->undo();
   };
   Real outside_work = 0, rigid_work = 0;  // by contacts
   const auto attempt = [&](int substeps) {
     flows = {};
     for (Contact& contact : island.contacts) contact.given = {};
     rigid_contacts.begin_attempt();
-    BackwardEuler step(island, duration / substeps);
-    for (int k = 0; k < substeps; ++k) step.run();
+    if (island.surface_scratch) island.surface_scratch->records.clear();
+    BackwardEuler step(island, surfaces, duration / substeps);
+    bool is_separated = true;
+    for (int k = 0; k < substeps && is_separated; ++k) is_separated = step.run();
     flows.constant_forces = constant_force_work(body);
     outside_work = step.outside_work();
     rigid_work = rigid_energy() - start_rigid_energy;
@@ -60,7 +65,7 @@ void advance_implicitly(Island& island, Real duration) {
     const Real end_energy = body.elastic_energy + kinetic_energy(body.particles);
     const Real tolerance = is_driven ? body.options.energy_tolerance : growth_noise;
     return Attempt{.substeps = substeps,
-                   .energy = end_energy,
+                   .energy = is_separated ? end_energy : std::numeric_limits<Real>::infinity(),
                    .allowed = allowed,
                    .noise = tolerance * (std::max(start_energy, end_energy) + start_rigid_energy) + body.energy_noise};
   };
@@ -70,8 +75,9 @@ void advance_implicitly(Island& island, Real duration) {
   report.retries = step.retries;
   report.finite = step.finite;
   report_particle_contacts(island);
-  SurfaceContacts surfaces(island);
-  find_records(island, surfaces);
+  if (island.surface_scratch) island.surface_scratch->num_touching = 0;
+  if (surfaces) surfaces->report();
+  find_records(island);
   if (step.finite) {
     flows.contact_loss = outside_work - rigid_work - flows.contacts;
     const Real missing = step.attempt.allowed - flows.contact_loss - step.attempt.energy;

@@ -1,10 +1,12 @@
-// One step by backward Euler of one body and what it touches.
+// One step by backward Euler of a soft body and what it touches.
 #pragma once
 #include "penalty/stepping/island.h"
 
 namespace penalty {
 
-/// Of an island that consists of one body and of contacts of its points with what takes no impulse.
-void advance_implicitly(Island& island, Real duration);
+class ImplicitSurfaces;
+
+/// Of an island of one soft body and of rigid ones. `surfaces`: those that may touch in this step; null: none.
+void advance_implicitly(Island& island, ImplicitSurfaces* surfaces, Real duration);
 
 }  // namespace penalty

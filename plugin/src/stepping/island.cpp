@@ -5,6 +5,9 @@
 
 #include "explicit_step.h"
 #include "implicit_step.h"
+#include "implicit_surfaces.h"
+#include "restitution.h"
+#include "rigid_contacts.h"
 #include "surface_contacts.h"
 
 namespace penalty {
@@ -28,30 +31,32 @@ bool lies(const Island& island) {
 }
 
 // An impact is for substeps, as long as they can be taken: backward Euler would eat the rebound.
-bool wants_implicit_step(const Island& island, Real duration) {
+bool wants_implicit_step(const Island& island, Real duration, bool touches) {
   const SteppedBody& body = *island.bodies.front();
   if (body.particles.size() == 0) return false;
   if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
-  const bool touches = !island.contacts.empty();
   const Real limit = duration * std::sqrt(body.largest_eigenvalue) / 2;
   const Real share = touches ? body.options.contact_safety : body.options.safety;
   if (body.options.substeps != 0 || !(limit > crossover_substeps * share)) return false;
   return !touches || limit > body.options.max_substeps || lies(island);
 }
 
-bool steps_implicitly(Island& island, Real duration) {
+bool may_bounce(const RigidContact& contact, const Island& island) {
+  const RigidBody &a = island.rigid_bodies[contact.a], &b = island.rigid_bodies[contact.b];
+  const RigidContactPlace place = place_of(contact, island);
+  const Vector3 speed = a.velocity_at(place.at - a.position) - b.velocity_at(place.at - b.position);
+  return contact.restitution > 0 && -place.normal.dot(speed) > restitution_threshold;
+}
+
+bool may_step_implicitly(const Island& island) {
   if (island.bodies.size() != 1 || !island.couplings.empty() || !island.anchors.empty() || !island.joints.empty())
     return false;
   for (const Contact& contact : island.contacts)
     if (!contact.b.is_rigid()) return false;
   for (const RigidBody& rigid : island.rigid_bodies)
     if (rigid.is_dynamic() && !rigid.is_free()) return false;
-  for (const RigidContact& contact : island.rigid_contacts)
-    if (contact.restitution > 0 || contact.rolling > 0 || contact.spinning > 0) return false;
-  if (!wants_implicit_step(island, duration)) return false;
-  SurfaceContacts surfaces(island);
-  surfaces.begin_step(duration);
-  return surfaces.least_substeps() == 1;  // far from itself, and from the edges of others
+  return std::ranges::none_of(island.rigid_contacts,
+                              [&island](const RigidContact& contact) { return may_bounce(contact, island); });
 }
 
 StepReport report_of(const Island& island) {
@@ -74,8 +79,7 @@ StepReport report_of(const Island& island) {
     sum.capped_energy += report.capped_energy;
   }
   sum.num_contacts = static_cast<int>(island.contacts.size());
-  if (!island.surfaces.empty() && island.surface_scratch)
-    sum.num_contacts += static_cast<int>(island.surface_scratch->pairs.size());
+  if (!island.surfaces.empty() && island.surface_scratch) sum.num_contacts += island.surface_scratch->num_touching;
   return sum;
 }
 
@@ -84,10 +88,17 @@ StepReport report_of(const Island& island) {
 StepReport advance(Island& island, Real duration) {
   island.records.clear();
   if (island.bodies.empty() || !(duration > 0) || !std::isfinite(duration)) return {};
-  if (steps_implicitly(island, duration))
-    advance_implicitly(island, duration);
-  else
-    advance_explicitly(island, duration);
+  if (may_step_implicitly(island) && wants_implicit_step(island, duration, !island.contacts.empty())) {
+    SurfaceContacts surfaces(island);
+    surfaces.begin_step(duration);
+    ImplicitSurfaces near(island);
+    const bool are_near = surfaces.least_substeps() > 1;
+    if (!are_near || (wants_implicit_step(island, duration, true) && near.can_step(duration))) {
+      advance_implicitly(island, are_near ? &near : nullptr, duration);
+      return report_of(island);
+    }
+  }
+  advance_explicitly(island, duration);
   return report_of(island);
 }
 

@@ -54,7 +54,7 @@ void LinearSystem::multiply(const PackedVectors& x, PackedVectors& y) const {
     y.col(column).head<3>() = rigid_bodies[k].translation * x.col(column).head<3>();
     y.col(column + 1).head<3>() = rigid_bodies[k].rotation * x.col(column + 1).head<3>();
   }
-  for (const ContactStiffness& contact : contacts) contact.sides.add(contact.stiffness * contact.sides.distance(x), y);
+  for (const ContactStiffness& contact : contacts) contact.sides.push(contact.stiffness * contact.sides.distance(x), y);
   clear_fixed(y);
 }
 
@@ -106,9 +106,9 @@ void LinearSolver::sum_blocks(const LinearSystem& system) {
 void LinearSolver::invert_diagonal(const LinearSystem& system) {
   inverse_diagonal_ = diagonal_;
   for (const ContactStiffness& contact : system.contacts) {
-    const WeightedPoint& point = contact.sides.point;
-    for (int k = 0; k < point.size; ++k)
-      inverse_diagonal_[point.particles[k]] += point.weights[k] * point.weights[k] * contact.stiffness;
+    const ContactSides& sides = contact.sides;
+    for (int k = 0; k < sides.num_particles; ++k)
+      inverse_diagonal_[sides.particles[k]] += sides.weights[k] * sides.weights[k] * contact.stiffness;
   }
   for (Matrix3& block : inverse_diagonal_) {
     const Real trace = block.trace();
@@ -162,18 +162,19 @@ void LinearSolver::sum_coarse_blocks(const LinearSystem& system, const Positions
 // What a contact adds to it, group by group: a rigid body, at its arm, moves by t + w x arm, too.
 void LinearSolver::add_coarse_contact(const LinearSystem& system, const ContactStiffness& contact) {
   coarse_motions_.clear();
-  const auto add = [this](int group, Real weight, const Vector3& arm) {
+  const auto add = [&](int group, Real weight, const Vector3& arm) {
     const auto known = std::ranges::find(coarse_motions_, group, [](const auto& motion) { return motion.first; });
     auto& motion = known != coarse_motions_.end()
                        ? known->second
                        : coarse_motions_.emplace_back(group, Eigen::Matrix<Real, 3, 6>::Zero()).second;
-    motion.leftCols<3>().diagonal().array() += weight;
-    motion.rightCols<3>() -= weight * cross_matrix(arm);
+    if (contact.sides.turn)
+      motion.rightCols<3>().diagonal().array() += weight;
+    else
+      motion += (Eigen::Matrix<Real, 3, 6>() << weight * Matrix3::Identity(), -weight * cross_matrix(arm)).finished();
   };
   const ContactSides& sides = contact.sides;
-  for (int k = 0; k < sides.point.size; ++k)
-    if (const int i = sides.point.particles[k]; moves_[i] != 0)
-      add(group_of_[i], sides.point.weights[k], arms_.col(i).head<3>());
+  for (int k = 0; k < sides.num_particles; ++k)
+    if (const int i = sides.particles[k]; moves_[i] != 0) add(group_of_[i], sides.weights[k], arms_.col(i).head<3>());
   for (int k = 0; k < sides.num_rigid; ++k) {
     const auto& [column, sign, arm] = sides.rigid[k];
     add(num_groups() + (column - system.matrix.num_particles()) / 2, sign, arm);

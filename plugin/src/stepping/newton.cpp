@@ -157,7 +157,7 @@ NewtonIteration NewtonSolver::descend() {
   const auto of_particles = direction_.leftCols(system_.matrix.num_particles());
   iteration.displacement = std::sqrt(of_particles.colwise().squaredNorm().maxCoeff());
 
-  Real length = 1;
+  Real length = objective.contacts ? objective.contacts->longest(direction_) : 1;
   for (int k = 0; k < most_backtracks; ++k) {
     trial_.positions = here_.positions + length * direction_;
     evaluate(trial_);

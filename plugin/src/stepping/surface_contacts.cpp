@@ -9,14 +9,12 @@
 namespace penalty {
 namespace {
 
-constexpr Real lost_recovery_speed = 0.02;  // of lost thickness, at most [m/s]
-constexpr Real exit_speed = 0.2;            // of what is led out of a closed surface, at most [m/s]
-constexpr Real exit_acceleration = 20;      // likewise [m/s²]: what is pressed in stays
-constexpr Real slop = 0.02;                 // share of the thickness that may be lost
-constexpr Real step_share = 0.5;            // of the thickness that a substep may bring surfaces closer
-constexpr Real common_direction = 0.2;      // share of the depths that must agree where enclosed points are led out
-constexpr int most_near_substeps = 400;     // to that end; beyond it the guard has more to do
-constexpr int fewest_substeps = 16;         // of a step in which surfaces are near
+constexpr Real exit_speed = 0.2;         // of what is led out of a closed surface, at most [m/s]
+constexpr Real exit_acceleration = 20;   // likewise [m/s²]: what is pressed in stays
+constexpr Real step_share = 0.5;         // of the thickness that a substep may bring surfaces closer
+constexpr Real common_direction = 0.2;   // share of the depths that must agree where enclosed points are led out
+constexpr int most_near_substeps = 400;  // to that end; beyond it the guard has more to do
+constexpr int fewest_substeps = 16;      // of a step in which surfaces are near
 constexpr int most_surface_sweeps = 50;
 constexpr Real tolerance = 0.003;         // sweeps end when none changes a distance by this share of the thickness,
 constexpr Real relative_tolerance = 0.5;  // and by no more than that of the first,
@@ -28,45 +26,21 @@ constexpr Real unseen_share = 0.15;  // where bodies lie, none changes a speed b
 SurfaceContacts::SurfaceContacts(Island& island)
     : island_(island),
       scratch_(*(island.surface_scratch ? island.surface_scratch
-                                        : island.surface_scratch = std::make_shared<SurfaceScratch>())) {
+                                        : island.surface_scratch = std::make_shared<SurfaceScratch>())),
+      surfaces_(island) {
   if (is_empty()) return;
-  surfaces_.assign(island.bodies.size(), nullptr);
   may_touch_.assign(island.bodies.size(), false);
-  for (const SurfaceContact& contact : island.surfaces) {
-    surfaces_[contact.body_a] = &contact.pair->a();
-    if (contact.rigid < 0) {
-      surfaces_[contact.body_b] = &contact.pair->b();
-      continue;
-    }
-    const std::pair surface(&contact.pair->b(), &island.rigid_bodies[contact.rigid]);
-    if (std::find(rigid_surfaces_.begin(), rigid_surfaces_.end(), surface) == rigid_surfaces_.end())
-      rigid_surfaces_.push_back(surface);
-  }
   first_particle_.push_back(0);
   for (const SteppedBody* body : island.bodies)
     first_particle_.push_back(first_particle_.back() + body->particles.size());
-}
-
-void SurfaceContacts::take_positions() {
-  for (std::size_t k = 0; k < surfaces_.size(); ++k)
-    if (surfaces_[k]) surfaces_[k]->take_positions(island_.bodies[k]->particles.positions);
-  for (const auto& [surface, body] : rigid_surfaces_) surface->take_positions(body->position, body->rotation);
-}
-
-void SurfaceContacts::take_velocities() {
-  for (std::size_t k = 0; k < surfaces_.size(); ++k)
-    if (surfaces_[k]) surfaces_[k]->take_velocities(island_.bodies[k]->particles.velocities);
-  for (const auto& [surface, body] : rigid_surfaces_) surface->take_velocities(body->velocity, body->angular_velocity);
 }
 
 void SurfaceContacts::begin_step(Real duration) {
   if (is_empty()) return;
   scratch_.records.clear();
   quiet_gravity_ = gravity_of_quiet();
-  for (std::size_t k = 0; k < surfaces_.size(); ++k)
-    if (surfaces_[k]) surfaces_[k]->begin_step(island_.bodies[k]->particles.positions);
-  for (const auto& [surface, body] : rigid_surfaces_) surface->begin_step(body->position, body->rotation);
-  take_velocities();
+  surfaces_.begin_step();
+  surfaces_.take_velocities();
   Real needed = 1;
   for (const SurfaceContact& contact : island_.surfaces) {
     SurfacePair& pair = *contact.pair;
@@ -108,7 +82,7 @@ void SurfaceContacts::sweep(Real h, Real remaining, Real since, const RigidSweep
   begin_sweeps();
   refresh(h, remaining);
   collect(h);
-  if (converge(h, since, rigid_sweep)) take_velocities();
+  if (converge(h, since, rigid_sweep)) surfaces_.take_velocities();
   guard(h, remaining, rigid_sweep);
   book();
 }
@@ -131,24 +105,20 @@ void SurfaceContacts::close_again(Real h, const RigidSweep& rigid_sweep) {
 }
 
 void SurfaceContacts::drifted(Real h) {
-  for (ContactSurface* surface : surfaces_)
-    if (surface) surface->drift(h);
-  for (const auto& [surface, body] : rigid_surfaces_) surface->drift(h);
-  take_positions();
+  surfaces_.drift(h);
+  surfaces_.take_positions();
 }
 
 void SurfaceContacts::undo() {
   outside_work_ = 0;
   scratch_.records.clear();
-  for (ContactSurface* surface : surfaces_)
-    if (surface) surface->forget();
-  for (const auto& [surface, body] : rigid_surfaces_) surface->forget();
-  take_positions();
+  surfaces_.forget();
+  surfaces_.take_positions();
   for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
 }
 
 void SurfaceContacts::begin_sweeps() {
-  take_velocities();
+  surfaces_.take_velocities();
   for (TouchingRecord& record : scratch_.records) record.given.is_last = false;
 }
 
@@ -167,8 +137,8 @@ void SurfaceContacts::collect(Real h) {
   for (TouchingPair& pair : scratch_.pairs) {
     pair.wanted = -pair.gap / h;
     if (pair.gap >= 0) continue;
-    const Real recovery = (-pair.gap - slop * pair.thickness) / std::max(recovery_time, h);
-    const Real fastest = pair.leads_out ? exit_speed : lost_recovery_speed,
+    const Real recovery = (-pair.gap - lost_share * pair.thickness) / std::max(recovery_time, h);
+    const Real fastest = pair.leads_out ? exit_speed : lost_thickness_speed,
                acceleration = pair.leads_out ? exit_acceleration : recovery_acceleration;
     pair.wanted =
         std::clamp<Real>(recovery, 0, std::min(fastest, std::max<Real>(speed_of(pair, 0), 0) + acceleration * h));
@@ -184,23 +154,15 @@ void SurfaceContacts::add(const SurfaceContact& contact, const FeaturePair& q, c
                     .thickness = q.thickness - surfaces.b().radius(),
                     .friction = surfaces.friction(),
                     .memory = memory,
-                    .features = features_of(contact, q, !memory),
+                    .features = features_of(island_, contact, q, !memory),
                     .kept_record = kept_record,
                     .leads_out = leads_out != nullptr,
                     .body_a = contact.body_a,
                     .body_b = contact.rigid < 0 ? contact.body_b : contact.body_a};
   const Real distance = closest.difference.norm();
   pair.gap = (leads_out ? -distance : distance) - q.thickness;
-  if (leads_out) {
-    pair.axes.col(0) = *leads_out;
-  } else if (!surfaces.has_no_direction(q, distance)) {
-    pair.axes.col(0) = closest.difference / distance;
-  } else {  // a closed surface knows its outside
-    if (q.are_edges || !two.is_closed()) return;
-    const Vector3 a = two.position(q.points[1]);
-    pair.axes.col(0) = (two.position(q.points[2]) - a).cross(two.position(q.points[3]) - a).normalized();
-    if (pair.axes.col(0).isZero(0)) return;
-  }
+  pair.axes.col(0) = leads_out ? *leads_out : surfaces.direction(q, closest);
+  if (pair.axes.col(0).isZero(0)) return;
   const int of_first = q.from_b ? contact.body_b : contact.body_a,
             of_second = q.from_b ? contact.body_a : contact.body_b;
   const int size_of_first = q.are_edges ? 2 : 1;

@@ -4,8 +4,7 @@
 #include <optional>
 #include <tuple>
 
-#include "penalty/contact/surface_pair.h"
-#include "penalty/stepping/island.h"
+#include "island_surfaces.h"
 
 namespace penalty {
 
@@ -78,7 +77,17 @@ struct SurfaceScratch {
   std::vector<TouchingParticle> particles;
   std::vector<FailingPair> failing;
   std::vector<TouchingRecord> records;  // of the attempt at the step
+  int num_touching = 0;                 // at its end
 };
+
+/// What features gave several times becomes one record.
+void merge(std::vector<TouchingRecord>& records);
+
+/// Adds a pair of features, and how deep it is [m], to the reports of its bodies, which may be one; -1: none.
+void book_touching(const Island& island, int body_a, int body_b, Real depth);
+
+TouchingFeatures features_of(const Island& island, const SurfaceContact& contact, const FeaturePair& q,
+                             bool is_enclosed = false);
 
 /// Each pair of features that may touch in a drift of h is a one-sided constraint on velocities along the direction n
 /// between its closest points as they are at this instant: of the distance D and the thickness d that is kept, the
@@ -140,9 +149,6 @@ class SurfaceContacts {
   /// Whether any has given something in this step.
   bool has_given() const { return !is_empty() && !scratch_.records.empty(); }
 
-  /// Adds what features have given so far in this step; the same features may do so twice before the report.
-  void add_records(std::vector<ContactRecord>& records) const;
-
   /// Of giving thickness back, leading out, and of whoever drives what is held [J].
   Real outside_work() const { return outside_work_; }
 
@@ -150,8 +156,6 @@ class SurfaceContacts {
   struct RigidMotion;  // of particles and rigid bodies that move as one
   struct Turning;      // of the particles of a pair
 
-  void take_positions();
-  void take_velocities();
   bool refresh(Real h, Real remaining);
   bool converge(Real h, Real since, const RigidSweep& rigid_sweep);
   Real gravity_of_quiet() const;
@@ -184,9 +188,6 @@ class SurfaceContacts {
   void open_record(TouchingPair& pair);
   void record(TouchingPair& pair);
   void record(const TouchingFeatures& features, Real thickness, const Vector3& given);
-  TouchingFeatures features_of(const SurfaceContact& contact, const FeaturePair& q, bool is_enclosed) const;
-  void merge_records();
-  ContactRecord record_of(const TouchingRecord& touching) const;
   void report_enclosed(const SurfaceContact& contact);
   std::span<TouchingParticle> particles_of(const TouchingPair& pair) const {
     return std::span(scratch_.particles).subspan(pair.begin, pair.end - pair.begin);
@@ -196,7 +197,6 @@ class SurfaceContacts {
   void guard(Real h, Real remaining, const RigidSweep& rigid_sweep);
   bool is_beyond_help() const;
   void find_failing(Real h);
-  bool is_safe(const SurfaceContact& contact, FeaturePair& q, Real h, Real reach) const;
   void freeze(Real h);
   void join(std::span<const int> numbers, std::span<const std::vector<FailingPair>> pairs_of);
   void make_rigid(std::span<const int> numbers);
@@ -212,8 +212,7 @@ class SurfaceContacts {
 
   Island& island_;
   SurfaceScratch& scratch_;
-  std::vector<ContactSurface*> surfaces_;  // of the island's bodies, null: none
-  std::vector<std::pair<ContactSurface*, RigidBody*>> rigid_surfaces_;
+  IslandSurfaces surfaces_;
   std::vector<int> first_particle_;  // of each body, and their number: particles numbered through, then rigid bodies
   std::vector<int> zone_;            // of particles that move as one: another of these; empty: none do
   std::vector<char> may_touch_;      // each body
@@ -224,7 +223,8 @@ class SurfaceContacts {
   Real outside_work_ = 0;
 };
 
-/// Sets the records of the island to what all its contacts have given so far in this step.
-void find_records(Island& island, const SurfaceContacts& surfaces);
+/// Sets the records of the island to what all its contacts have given so far in this step; the same features may be in
+/// two of them before the report.
+void find_records(Island& island);
 
 }  // namespace penalty

@@ -71,6 +71,8 @@ class ContactSurface {
   void begin_step(const Vector3& origin, const Matrix3& rotation);
   void take_positions(const Vector3& origin, const Matrix3& rotation);
   void take_velocities(const Vector3& velocity, const Vector3& angular_velocity);
+  /// Velocities that bring it from where it is to there in a second.
+  void take_way_to(const Vector3& origin, const Matrix3& rotation);
 
   /// What a point of a rigid body that moves on for `duration` [s] ends off the straight line, at most [m].
   Real bend(Real duration) const;

@@ -96,6 +96,16 @@ class SurfacePair {
     return (knows_outside ? on_surface : round_off) * q.thickness;
   }
 
+  /// Unit vector from the second feature to the first: between these closest points or, where that says nothing, out of a
+  /// closed surface; zero where there is no telling.
+  Vector3 direction(const FeaturePair& q, const ClosestPoints& closest) const;
+
+  /// How much of a drift of h [s], at velocities that were taken, features may do: all of it, which is 1, if they come
+  /// together by less than what is between them, or are behind a plane each, some way apart, at its start and its end. Linear
+  /// motions that are separated by a plane at both ends are so throughout. Else what one such plane allows. `reach`: what
+  /// their distance can change by [m].
+  Real separated_share(FeaturePair& q, Real h, Real reach) const;
+
  private:
   static constexpr Real on_surface = 1e-3, round_off = 1e-9;
 

@@ -157,7 +157,8 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 ///
 /// by projected Newton iterations with a line search; a rigid body adds the like of the first term for its translation and
 /// its rotation vector. Contacts press and rub by stiff potentials of their own, with multipliers and limits of friction that are
-/// updated in between. Depth is taken back at half a metre a second at most. Unlike that minimum, which turns too slowly,
+/// updated in between. Depth is taken back at half a metre a second at most. Where surfaces are near, no iteration moves them
+/// further than a plane between each two features allows, and their contacts are taken anew on the way. Unlike that minimum, which turns too slowly,
 /// the step keeps the angular momentum of a free body that touches nothing but free bodies, and the linear one in spite of
 /// iterations that end early: a rigid velocity is added. Energy that would grow all the same is taken from the velocities
 /// that deform the body. StepReport says how much.

@@ -9,36 +9,57 @@
 
 namespace penalty {
 
-/// The two sides of a contact: a point of particles, or none, and points of up to two rigid bodies. What x says of their
-/// distance is J x, the sum of w_k x_k over the particles and of s (t + theta x arm) over the rigid bodies, whose columns of x
-/// are their translation t [m] and their rotation vector theta [rad].
+/// The two sides of a contact: points of particles, of one side or of both, and points of up to two rigid bodies. What x
+/// says of the way from the second to the first is J x, the sum of w_k x_k over the particles and of s (t + theta x arm) over
+/// the rigid bodies, whose columns of x are their translation t [m] and their rotation vector theta [rad]. Between two rigid
+/// bodies it may also be how they turn, the sum of s theta; then G is in N m, and what is below a force is a moment.
 struct ContactSides {
+  static constexpr int most_particles = 16;  // two edges, or a point and a triangle, of an embedded surface
   struct OnRigid {
     int column = 0;  // of t; that of theta is the next
-    Real sign = 0;   // s, 1 or -1
+    Real sign = 0;   // s: 1 on the first side, -1 on the second
     Vector3 arm = Vector3::Zero();
-  };
-  WeightedPoint point = {};
-  std::array<OnRigid, 2> rigid = {};
-  int num_rigid = 0;
 
-  /// J x.
-  Vector3 distance(const PackedVectors& x) const {
-    Vector3 sum = point.of(x);
-    for (int k = 0; k < num_rigid; ++k) {
-      const auto& [column, sign, arm] = rigid[k];
-      sum += sign * (x.col(column).head<3>() + x.col(column + 1).head<3>().cross(arm));
+    Vector3 way(const PackedVectors& x, bool turns) const {
+      const Vector3 theta = x.col(column + 1).head<3>();
+      return sign * (turns ? theta : Vector3(x.col(column).head<3>() + theta.cross(arm)));
     }
+  };
+  bool turn = false;
+  int num_rigid = 0, num_particles = 0;
+  std::array<OnRigid, 2> rigid = {};
+  std::array<int, most_particles> particles{};
+  std::array<Real, most_particles> weights{};  // w_k
+
+  /// Adds a point with this weight, which is negative on the second side; points may share particles.
+  void add(const WeightedPoint& point, Real weight) {
+    for (int k = 0; k < point.size; ++k) {
+      int at = 0;
+      while (at < num_particles && particles[at] != point.particles[k]) ++at;
+      if (at == num_particles) particles[num_particles++] = point.particles[k];
+      weights[at] += weight * point.weights[k];
+    }
+  }
+
+  /// J x, and what of it is the particles'.
+  Vector3 distance(const PackedVectors& x) const {
+    Vector3 sum = distance_of_particles(x);
+    for (int k = 0; k < num_rigid; ++k) sum += rigid[k].way(x, turn);
+    return sum;
+  }
+  Vector3 distance_of_particles(const PackedVectors& x) const {
+    Vector3 sum = Vector3::Zero();
+    for (int k = 0; k < num_particles; ++k) sum += weights[k] * x.col(particles[k]).head<3>();
     return sum;
   }
 
   /// y += Jᵀ force.
-  void add(const Vector3& force, PackedVectors& y) const {
-    for (int k = 0; k < point.size; ++k) y.col(point.particles[k]).head<3>() += point.weights[k] * force;
+  void push(const Vector3& force, PackedVectors& y) const {
+    for (int k = 0; k < num_particles; ++k) y.col(particles[k]).head<3>() += weights[k] * force;
     for (int k = 0; k < num_rigid; ++k) {
       const auto& [column, sign, arm] = rigid[k];
-      y.col(column).head<3>() += sign * force;
-      y.col(column + 1).head<3>() += sign * arm.cross(force);
+      if (!turn) y.col(column).head<3>() += sign * force;
+      y.col(column + 1).head<3>() += sign * (turn ? force : arm.cross(force));
     }
   }
 };
@@ -99,6 +120,10 @@ class LinearSolver {
 
   /// r . P⁻¹ r, P the preconditioner.
   Real squared_norm(const LinearSystem& system, const PackedVectors& r);
+  /// What some columns have of that, when it was computed last.
+  Real share_of_norm(const PackedVectors& r, Eigen::Index first, Eigen::Index count) const {
+    return r.middleCols(first, count).cwiseProduct(preconditioned_.middleCols(first, count)).sum();
+  }
 
   /// Of particles.
   int num_groups() const { return static_cast<int>(group_begin_.empty() ? 0 : group_begin_.size() - 1); }

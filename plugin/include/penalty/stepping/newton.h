@@ -74,6 +74,10 @@ class NewtonSolver {
 
   /// dPhi . P⁻¹ dPhi, with the last preconditioner: about twice what Phi could still fall by [J].
   Real squared_residual();
+  /// What some columns have of that, when it was computed last.
+  Real residual_share(Eigen::Index first, Eigen::Index count) const {
+    return solver_.share_of_norm(here_.gradient, first, count);
+  }
 
   /// After contacts have changed.
   void evaluate_again() { evaluate(here_); }
