@@ -57,6 +57,7 @@ struct BoxAndBall {
     body.body.options.damping_time = 0.01 * std::sqrt(size);
     body.body.gravity = {0, -implicit_gravity, 0};
     std::vector<WeightedPoint> points;
+    points.reserve(count);
     for (int i = 0; i < body.particles().size(); ++i) points.push_back(WeightedPoint::at_particle(i));
     under = std::make_unique<ContactSurface>(points, triangles, std::vector<Edge>{}, pack(mesh.vertices));
     over = std::make_unique<ContactSurface>(std::array{Vector3(0, 0, 0)}, std::vector<Edge>{{0, 0}}, radius);
@@ -103,6 +104,20 @@ TEST(ImplicitSurface, ABallSmallerThanATriangleLiesOnItWithItsWeight) {
       EXPECT_NEAR(-given.y() / s.duration, weight, 1e-3 * weight);
       EXPECT_LT(std::abs(s.ball().velocity.y()), 1e-4 * std::sqrt(implicit_gravity * size));
     }
+}
+
+TEST(ImplicitSurface, AutomaticLeavesTheHitToSubstepsAndTakesWhatLies) {
+  BoxAndBall s(0.05, 1, {0.5, 0.57, 0.45});
+  s.body.body.options.integrator = Integrator::automatic;
+  s.body.body.largest_eigenvalue = 1e9;  // as if it were that stiff
+  s.body.body.options.max_substeps = 1000;
+  s.ball().velocity.y() = -2;
+  s.step();
+  EXPECT_EQ(s.body.body.report.integrator, Integrator::explicit_step);
+  EXPECT_GT(s.ball().velocity.y(), -1) << "has not hit";
+  for (int k = 0; k < 200; ++k) s.step();
+  EXPECT_EQ(s.body.body.report.integrator, Integrator::implicit_step);
+  EXPECT_GT(s.body.body.report.num_contacts, 0);
 }
 
 TEST(ImplicitSurface, WhatIsHeldAndMovesIsLeftToTheSubsteps) {
