@@ -32,7 +32,7 @@ TEST(ImplicitSurface, AClothFallsIntoFoldsAndLiesStillWithoutCrossingItself) {
   EXPECT_GT(steps_in_contact, 60);
   EXPECT_LE(highest, start);
   EXPECT_LT(bodies.energy(), 0.5 * start) << "did not fall";
-  EXPECT_GT(least, 0.1 * bodies.margin);
+  EXPECT_GT(least, 0.25 * bodies.margin) << "planes alone leave a tenth of what was";
   EXPECT_LT(bodies.kinetic_energy(), 1e-9);
 }
 

@@ -102,19 +102,15 @@ void ImplicitContacts::add_turning(const RigidContact& contact, int presser) {
 // With what is left of it: the rigid bodies.
 void ImplicitContacts::add(Row row, Real gap, Real deepest, bool bends) {
   bool moves = is_any_free(row.sides);
-  int column = body_.particles.size();
-  for (RigidBody& body : island_.rigid_bodies) {
-    for (const auto& [side, arm, sign] : {std::tuple(row.a, row.arm_a, 1), std::tuple(row.b, row.arm_b, -1)}) {
-      if (side != &body) continue;
-      const Vector3 way = -sign * way_of(body, arm, bends);
-      row.way += way;
-      if (body.is_dynamic())
-        row.sides.rigid[row.sides.num_rigid++] = {.column = column, .sign = Real(sign), .arm = arm};
-      else
-        row.driven += way;
-      moves = moves || body.is_dynamic();
-    }
-    if (body.is_dynamic()) column += 2;
+  for (const auto& [body, arm, sign] : {std::tuple(row.a, row.arm_a, 1), std::tuple(row.b, row.arm_b, -1)}) {
+    if (!body) continue;
+    const Vector3 way = -sign * way_of(*body, arm, bends);
+    row.way += way;
+    if (const auto column = static_cast<int>(column_of(*body, island_)); column >= 0)
+      row.sides.rigid[row.sides.num_rigid++] = {.column = column, .sign = Real(sign), .arm = arm};
+    else
+      row.driven += way;
+    moves = moves || body->is_dynamic();
   }
   if (!moves) return;
   // Depth comes back no faster than is good, and what is too deep stays.

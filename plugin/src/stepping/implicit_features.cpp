@@ -69,7 +69,7 @@ void ImplicitContacts::add(const SurfaceContact& contact, FeaturePair& q, Real r
     (is_first ? row.a : row.b) = &body;
     (is_first ? row.arm_a : row.arm_b) = arm;
     row.place = body.position + arm;
-    if (const Eigen::Index column = surfaces_->column_of(body); column >= 0) {
+    if (const Eigen::Index column = column_of(body, island_); column >= 0) {
       row.sides.rigid[row.sides.num_rigid++] = {.column = static_cast<int>(column), .sign = -row.soft_sign, .arm = arm};
       moves = true;
     }

@@ -17,6 +17,16 @@ Matrix3 rotation_of(const Vector3& turn) {
 
 }  // namespace
 
+Eigen::Index column_of(const RigidBody& body, const Island& island) {
+  if (!body.is_dynamic()) return -1;
+  Eigen::Index column = island.bodies.front()->particles.size();
+  for (const RigidBody& other : island.rigid_bodies) {
+    if (&other == &body) break;
+    if (other.is_dynamic()) column += 2;
+  }
+  return column;
+}
+
 bool ImplicitSurfaces::can_step(Real duration) const {
   for (const SurfaceContact& contact : island_.surfaces) {
     if (contact.pair->is_tangled()) return false;
@@ -38,18 +48,8 @@ void ImplicitSurfaces::undo() {
   for (const SurfaceContact& contact : island_.surfaces) contact.pair->begin_step();
 }
 
-Eigen::Index ImplicitSurfaces::column_of(const RigidBody& body) const {
-  if (!body.is_dynamic()) return -1;
-  Eigen::Index column = island_.bodies.front()->particles.size();
-  for (const RigidBody& other : island_.rigid_bodies) {
-    if (&other == &body) break;
-    if (other.is_dynamic()) column += 2;
-  }
-  return column;
-}
-
 Vector3 ImplicitSurfaces::center_of(const RigidBody& body) const {
-  const Eigen::Index column = column_of(body);
+  const Eigen::Index column = column_of(body, island_);
   return column < 0 ? body.position : Vector3(body.position + at_.col(column).head<3>());
 }
 
@@ -60,7 +60,7 @@ void ImplicitSurfaces::refresh() {
 Real ImplicitSurfaces::aim(const PackedVectors& displacement) {
   surfaces_.visit_soft([&](ContactSurface& surface, const SteppedBody&) { surface.take_velocities(displacement); });
   surfaces_.visit_rigid([&](ContactSurface& surface, const RigidBody& body) {
-    const Eigen::Index column = column_of(body);
+    const Eigen::Index column = column_of(body, island_);
     if (column < 0) return;
     const PackedVectors& by = displacement;
     surface.take_way_to(center_of(body) + by.col(column).head<3>(),
@@ -79,7 +79,7 @@ void ImplicitSurfaces::move(Real share, const PackedVectors& x) {
   at_ = x;
   surfaces_.visit_soft([&](ContactSurface& surface, const SteppedBody&) { surface.take_positions(x); });
   surfaces_.visit_rigid([&](ContactSurface& surface, const RigidBody& body) {
-    if (const Eigen::Index column = column_of(body); column >= 0)
+    if (const Eigen::Index column = column_of(body, island_); column >= 0)
       surface.take_positions(center_of(body), rotation_of(x.col(column + 1).head<3>()) * body.rotation);
   });
 }

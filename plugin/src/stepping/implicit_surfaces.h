@@ -4,6 +4,9 @@
 
 namespace penalty {
 
+/// The first of the two columns of a rigid body of the island among the unknowns of an implicit step; -1: it is not dynamic.
+Eigen::Index column_of(const RigidBody& body, const Island& island);
+
 /// Takes surfaces along as Newton's method moves the bodies, and says how far they may go at once: every pair of features
 /// that may meet on the way has a plane between it, so nothing crosses, wherever the iterations end. Vectors are columns
 /// of particles, then translation and rotation vector of each dynamic rigid body since the step began.
@@ -40,8 +43,7 @@ class ImplicitSurfaces {
   /// Between these features, where the step began [m].
   Real distance_at_start(const SurfaceContact& contact, const FeaturePair& q) const;
 
-  /// The first column of a rigid body, -1: it is not dynamic; and where its centre is now [m].
-  Eigen::Index column_of(const RigidBody& body) const;
+  /// Where the centre of a rigid body is now [m].
   Vector3 center_of(const RigidBody& body) const;
 
   /// Adds what is near to the reports of bodies.
