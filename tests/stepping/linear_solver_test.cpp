@@ -1,33 +1,58 @@
 #include "penalty/stepping/linear_solver.h"
 
 #include <Eigen/Cholesky>
+#include <deque>
 
 #include "stepping/islands.h"
 
 namespace penalty::testing {
 namespace {
 
-// The stiffness of a deformed body, some inertia, and whatever is asked for besides.
+// The stiffness of deformed bodies, some inertia, and whatever is asked for besides.
 struct Problem {
-  PackedVectors x, b;
+  PackedVectors x, b;  // of all bodies
+  std::deque<BodyMatrix> bodies;
   LinearSystem system;
 
   explicit Problem(unsigned seed, const std::array<int, 3>& cells = {3, 2, 2}, Real inertia = 1e-3) {
+    add_body(seed, cells, inertia);
+  }
+  Problem(const Problem&) = delete;
+
+  void add_body(unsigned seed, const std::array<int, 3>& cells = {3, 2, 2}, Real inertia = 1e-3) {
     Random random(seed);
     const TetMesh mesh = noisy_box(cells, 0.5, 0.1, random);
     const PotentialField field = make_elastic_field(mesh.vertices, mesh.tetrahedra, Material{.young = 100});
-    x = deformed(field.rest_positions(), 0.02, random);
+    const PackedVectors positions = deformed(field.rest_positions(), 0.02, random);
+    BodyMatrix& body = bodies.emplace_back();
+    body.values = assembled(field, positions, StiffnessModel::psd_projected);
+    for (int i = 0; i < positions.cols(); ++i) body.values.add_to_diagonal(i, inertia * random.uniform(1, 2));
+    system.bodies.push_back(&body);
+    x.conservativeResize(4, x.cols() + positions.cols());
+    x.rightCols(positions.cols()) = positions;
     b = random_packed(x.cols(), 1, random);
-    system.matrix = assembled(field, x, StiffnessModel::psd_projected);
-    for (int i = 0; i < x.cols(); ++i) system.matrix.add_to_diagonal(i, inertia * random.uniform(1, 2));
   }
 
   void add_term(unsigned seed, Real coefficient) {
     Random random(seed);
     std::vector<int> everyone;
-    everyone.reserve(x.cols());
-    for (int i = 0; i < x.cols(); ++i) everyone.push_back(i);
-    system.matrix.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(x.cols(), 1));
+    const int size = bodies.front().num_particles();
+    everyone.reserve(size);
+    for (int i = 0; i < size; ++i) everyone.push_back(i);
+    bodies.front().values.add_term(coefficient, everyone, random.vectors<Eigen::Dynamic>(size, 1));
+  }
+
+  // Contacts of this stiffness between the first body and the second.
+  void add_contacts_between_bodies(unsigned seed, Real stiffness) {
+    Random random(seed);
+    for (int k = 0; k < 5; ++k) {
+      ContactSides sides;
+      sides.add({{k, k + 7, k + 12}, {0.5, 0.2, 0.3}, 3}, 1);
+      sides.add({{k, k + 9, k + 13}, {0.1, 0.2, 0.7}, 3}, -1, bodies.front().num_particles());
+      EXPECT_EQ(sides.num_particles, 6);
+      const Matrix3 m = random.vectors<3>(3, 1);
+      system.contacts.push_back({sides, stiffness * m * m.transpose()});
+    }
   }
 
   // Two rigid bodies, one between the particles and the other, and contacts of all of them of this stiffness.
@@ -60,10 +85,25 @@ struct Problem {
     }
   }
 
+  // Columns of particles that do not move.
+  std::vector<int> fixed() const {
+    std::vector<int> columns;
+    int first = 0;
+    for (const BodyMatrix& body : bodies) {
+      for (const int i : body.fixed) columns.push_back(first + i);
+      first += body.num_particles();
+    }
+    return columns;
+  }
+
   Eigen::MatrixXd dense() const {
     Eigen::MatrixXd a = Eigen::MatrixXd::Zero(3 * system.num_columns(), 3 * system.num_columns());
-    a.topLeftCorner(3 * x.cols(), 3 * x.cols()) = system.matrix.to_dense();
-    Eigen::Index row = 3 * x.cols();
+    Eigen::Index row = 0;
+    for (const BodyMatrix& body : bodies) {
+      const Eigen::Index size = 3 * body.num_particles();
+      a.block(row, row, size, size) = body.values.to_dense();
+      row += size;
+    }
     for (const auto& [translation, rotation] : system.rigid_bodies) {
       a.block<3, 3>(row, row) = translation;
       a.block<3, 3>(row + 3, row + 3) = rotation;
@@ -82,7 +122,7 @@ struct Problem {
       }
       a += jacobian.transpose() * stiffness * jacobian;
     }
-    for (const int i : system.fixed) {
+    for (const int i : fixed()) {
       a.middleRows<3>(3 * i).setZero();
       a.middleCols<3>(3 * i).setZero();
       a.block<3, 3>(3 * i, 3 * i).setIdentity();
@@ -97,12 +137,17 @@ struct Problem {
     return pack(solution.reshaped(3, b.cols()));
   }
 
-  PackedVectors solved(int* iterations = nullptr, const LinearOptions& options = {2000, 1e-12}) const {
+  PackedVectors solved(int* iterations = nullptr, const LinearOptions& options = {2000, 1e-12}) {
+    Eigen::Index first = 0;
+    for (BodyMatrix& body : bodies) {
+      body.make_groups();
+      body.factorize(x.middleCols(first, body.num_particles()));
+      first += body.num_particles();
+    }
     LinearSolver solver;
-    solver.set_pattern(system.matrix.blocks());
-    solver.factorize(system, x);
+    solver.factorize(system);
     PackedVectors y;
-    const int used = solver.solve(system, b, options, y).iterations;
+    const int used = solver.solve(system, b, options, y);
     if (iterations) *iterations = used;
     return y;
   }
@@ -113,10 +158,10 @@ TEST(LinearSolver, SolvesWhatADenseFactorisationSolves) {
   for (unsigned seed = 0; seed < 10; ++seed) {
     Problem problem(seed);
     plain.see(relative_error(problem.solved(), problem.exact()), seed);
-    problem.system.fixed = {0, 5, 17};
+    problem.bodies.front().fixed = {0, 5, 17};
     const PackedVectors y = problem.solved();
     fixed.see(relative_error(y, problem.exact()), seed);
-    for (const int i : problem.system.fixed) EXPECT_TRUE(y.col(i).isZero(0));
+    for (const int i : problem.fixed()) EXPECT_TRUE(y.col(i).isZero(0));
     problem.add_term(seed, 1e4);
     problem.add_term(seed + 100, 3);
     terms.see(relative_error(problem.solved(), problem.exact()), seed);
@@ -131,15 +176,32 @@ TEST(LinearSolver, SolvesWithRigidBodiesAndContactsHoweverHard) {
   for (unsigned seed = 0; seed < 10; ++seed)
     for (const Real stiffness : {1e-2, 1e2, 1e6}) {
       Problem problem(seed);
-      problem.system.fixed = {0, 5, 17};
+      problem.bodies.front().fixed = {0, 5, 17};
       problem.add_rigid_bodies(seed, stiffness);
       error.see(relative_error(problem.solved(), problem.exact()), seed);
     }
   error.expect_below(1e-6, "solution");
 }
 
+TEST(LinearSolver, SolvesForSeveralBodiesAtOnce) {
+  WorstError apart, in_contact;
+  for (unsigned seed = 0; seed < 10; ++seed)
+    for (const Real stiffness : {1e-2, 1e2, 1e6}) {
+      Problem problem(seed);
+      problem.add_body(seed + 100, {2, 2, 3});
+      problem.bodies.front().fixed = {0, 5, 17};
+      problem.bodies.back().fixed = {1, 13};
+      apart.see(relative_error(problem.solved(), problem.exact()), seed);
+      problem.add_contacts_between_bodies(seed, stiffness);
+      problem.add_rigid_bodies(seed, stiffness);
+      in_contact.see(relative_error(problem.solved(), problem.exact()), seed);
+    }
+  apart.expect_below(1e-8, "apart");
+  in_contact.expect_below(1e-6, "in contact");
+}
+
 TEST(LinearSolver, LeadsDownhillHoweverEarlyItStops) {
-  const Problem problem(3);
+  Problem problem(3);
   for (int most = 1; most < 12; ++most) {
     int iterations = 0;
     const PackedVectors y = problem.solved(&iterations, {most, 1e-12});
@@ -157,7 +219,7 @@ TEST(LinearSolver, CoarseSpaceKeepsTheIterationsOfALongBarFew) {
     PackedVectors r = problem.b, z = r, q(4, r.cols());
     const auto precondition = [&] {
       for (int i = 0; i < r.cols(); ++i)
-        z.col(i).head<3>() = a.matrix.blocks().diagonal(i).ldlt().solve(Vector3(r.col(i).head<3>()));
+        z.col(i).head<3>() = a.bodies.front()->values.blocks().diagonal(i).ldlt().solve(Vector3(r.col(i).head<3>()));
     };
     precondition();
     PackedVectors p = z;
@@ -176,7 +238,7 @@ TEST(LinearSolver, CoarseSpaceKeepsTheIterationsOfALongBarFew) {
     return iterations;
   };
   int with = 0;
-  const Problem bar(1, {32, 2, 2}, 1e-7);
+  Problem bar(1, {32, 2, 2}, 1e-7);
   bar.solved(&with, {5000, 1e-6});
   const int without = without_coarse_space(bar);
   RecordProperty("with", with);
@@ -194,7 +256,7 @@ TEST(LinearSolver, HasNothingToDoForZero) {
 
 TEST(LinearSolver, EveryParticleMayBeFixed) {
   Problem problem(1);
-  for (int i = 0; i < problem.x.cols(); ++i) problem.system.fixed.push_back(i);
+  for (int i = 0; i < problem.x.cols(); ++i) problem.bodies.front().fixed.push_back(i);
   EXPECT_TRUE(problem.solved().isZero(0));
 }
 
@@ -206,7 +268,7 @@ TEST(LinearSolver, ParticlesInOnePlaceAreNoObstacle) {
 }
 
 TEST(LinearSolver, GivesTheSameBitsTwice) {
-  const Problem problem(4);
+  Problem problem(4);
   EXPECT_EQ(problem.solved(nullptr, {25, 1e-3}), problem.solved(nullptr, {25, 1e-3}));
 }
 

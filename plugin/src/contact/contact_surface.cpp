@@ -192,9 +192,9 @@ Box ContactSurface::box_of_triangle(int triangle) const {
   return box;
 }
 
-void ContactSurface::take_positions(const PackedVectors& positions) {
+void ContactSurface::take_positions(const PackedVectors& positions, Eigen::Index first) {
   for (std::size_t k = 0; k < points_.size(); ++k)
-    positions_.col(static_cast<Eigen::Index>(k)).head<3>() = points_[k].of(positions);
+    positions_.col(static_cast<Eigen::Index>(k)).head<3>() = points_[k].of(positions, first);
   ++instant_;
 }
 
@@ -207,9 +207,9 @@ void ContactSurface::begin_step(const PackedVectors& positions) {
   take_positions(positions);
 }
 
-void ContactSurface::take_velocities(const PackedVectors& velocities) {
+void ContactSurface::take_velocities(const PackedVectors& velocities, Eigen::Index first) {
   for (std::size_t k = 0; k < points_.size(); ++k)
-    velocities_.col(static_cast<Eigen::Index>(k)).head<3>() = points_[k].of(velocities);
+    velocities_.col(static_cast<Eigen::Index>(k)).head<3>() = points_[k].of(velocities, first);
   measure_patches();
 }
 

@@ -46,17 +46,14 @@ Real SurfacePair::separated_share(FeaturePair& q, Real h, Real reach) const {
       distance, std::max(radius + kept_share * std::min(std::max<Real>(distance - radius, 0), q.thickness - radius),
                          2 * least_distance(q)));
   if (reach + bend < distance - kept) return 1;
-  const auto surface_of = [&](int k) -> const ContactSurface& {
-    return k < (q.are_edges ? 2 : 1) ? first(q) : second(q);
-  };
   std::array<Vector3, 4> v;
-  for (int k = 0; k < 4; ++k) v[k] = surface_of(k).velocity(q.points[k]);
+  for (int k = 0; k < 4; ++k) v[k] = surface_of(q, k).velocity(q.points[k]);
   Real relative2 = 0;
   for (int k = 1; k < 4; ++k) relative2 = std::max(relative2, (v[k] - v[0]).squaredNorm());
   if (2 * h * std::sqrt(relative2) < distance - kept) return 1;
   std::array<Vector3, 4> start, end;
   for (int k = 0; k < 4; ++k) {
-    start[k] = surface_of(k).position(q.points[k]);
+    start[k] = surface_of(q, k).position(q.points[k]);
     end[k] = start[k] + h * v[k];
   }
   const Vector3 n = q.difference / distance;

@@ -1,4 +1,4 @@
-// Backward Euler steps of a soft body and the rigid ones that it touches.
+// Backward Euler steps of soft bodies and the rigid ones that they touch.
 #pragma once
 #include "penalty/stepping/island.h"
 
@@ -8,29 +8,40 @@ class ImplicitContacts;
 class ImplicitSurfaces;
 struct RigidState;
 
+/// The columns of a body among those of all unknowns.
+template <class Columns>
+auto columns_of(const SteppedBody& body, Columns& all) {
+  return all.middleCols(body.implicit.first, body.particles.size());
+}
+
+inline bool is_free(const SteppedBody& body) { return body.implicit.newton.fixed().empty(); }
+
 /// Takes steps of `duration` [s]; whether their energy is right is for others to see.
 class BackwardEuler {
  public:
-  /// `surfaces`: those that may touch; null: none.
-  BackwardEuler(Island& island, ImplicitSurfaces* surfaces, Real duration);
+  BackwardEuler(Island& island, ImplicitSurfaces& surfaces, Real duration);
 
-  /// Returns whether nothing has come through anything else.
+  /// Returns whether nothing has come through anything else; if not, bodies may be anywhere.
   bool run();
 
   /// Of obstacles that move, of taking depth back, and of what turns a rigid body's axes, so far [J].
   Real outside_work() const { return outside_work_; }
 
-  /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion; of a body with pinned
-  /// particles from all velocities.
+  /// Takes energy beyond `allowed` [J] from the velocities relative to the rigid motion of each body; of one with pinned
+  /// particles from all its velocities.
   void cap_energy(Real allowed);
 
  private:
+  void prepare(SteppedBody& body);
   void aim();
+  void aim(SteppedBody& body);
   void aim_rigid_bodies();
-  template <class Derived>
-  const PackedVectors& guess(const Eigen::MatrixBase<Derived>& positions, bool rigid_bodies_move);
+  const PackedVectors& guess(bool rigid_bodies_move);
   void choose_start();
-  Real noise() const;
+  void offer_rigid_motion();
+  void keep_stiffness();
+  void forget_stiffness();
+  void book(const NewtonIteration& iteration);
   void find_enough();
   Real residual();
   void minimize();
@@ -38,19 +49,19 @@ class BackwardEuler {
   void begin_in_contact(ImplicitContacts& contacts);
   void minimize_in_contact(ImplicitContacts& contacts);
   void drift_rigid_bodies();
-  void restore_momenta(const RigidState& before, const ImplicitContacts& contacts);
-  bool is_free() const { return newton_.fixed().empty(); }
-  Real stiffness_range() const;
+  void end(std::size_t body, const ImplicitContacts& contacts);
+  void restore_momenta(std::size_t body, const RigidState& before, const ImplicitContacts& contacts);
 
   Island& island_;
-  SteppedBody& body_;
-  Particles& particles_;
   ImplicitState& state_;
   NewtonSolver& newton_;
-  ImplicitSurfaces* surfaces_;
+  ImplicitSurfaces& all_surfaces_;
+  ImplicitSurfaces* surfaces_;  // if they may touch
   Real duration_, outside_work_ = 0;
+  Real gravity_ = 0;  // largest of a body [m/s²]
+  int most_iterations_ = 0;
   bool touches_ = false;
-  std::vector<Real> enough_;  // of the squared residual, for each body: the soft one, then rigid ones
+  std::vector<Real>& enough_;  // of the squared residual, for each body: the soft ones, then rigid ones
 };
 
 }  // namespace penalty

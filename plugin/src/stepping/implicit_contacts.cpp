@@ -39,19 +39,41 @@ Real mobility_of(const RigidBody* body, const Vector3& arm, const Vector3& direc
 
 }  // namespace
 
-ImplicitContacts::ImplicitContacts(Island& island, std::vector<RememberedContact>& memory, ImplicitSurfaces* surfaces,
-                                   Real duration)
-    : island_(island), body_(*island.bodies.front()), duration_(duration), surfaces_(surfaces) {
-  rows_.reserve(island.contacts.size() + island.rigid_contacts.size());
+ImplicitContacts::ImplicitContacts(Island& island, const PackedVectors& from, ImplicitSurfaces* surfaces, Real duration)
+    : ImplicitContacts(island, *island.bodies.front()->implicit.contact_scratch, from, surfaces, duration) {}
+
+ImplicitContacts::ImplicitContacts(Island& island, ImplicitContactScratch& scratch, const PackedVectors& from,
+                                   ImplicitSurfaces* surfaces, Real duration)
+    : island_(island),
+      from_(from),
+      duration_(duration),
+      surfaces_(surfaces),
+      rows_(scratch.rows),
+      old_rows_(scratch.old_rows),
+      inverse_masses_(scratch.inverse_masses),
+      shares_(scratch.shares),
+      given_(scratch.given) {
+  rows_.clear();
+  given_.assign(island.bodies.size(), {});
+  inverse_masses_.clear();
+  for (const SteppedBody* body : island.bodies)
+    inverse_masses_.insert(inverse_masses_.end(), body->particles.inverse_masses.begin(),
+                           body->particles.inverse_masses.end());
   for (Contact& contact : island.contacts) {
     const ContactPlace place = place_of(contact, island);
-    Row row{.contact = &contact, .b = &island.rigid_bodies[contact.b.rigid]};
-    row.arm_b = place.at - row.b->position;
-    row.sides.add(contact.a.point, 1);
+    Row row{.contact = &contact, .soft_a = contact.a.body, .soft_b = contact.b.body};
+    row.sides.add(contact.a.point, 1, first_of(row.soft_a));
+    if (contact.b.is_rigid()) {
+      row.b = &island.rigid_bodies[contact.b.rigid];
+      row.arm_b = place.at - row.b->position;
+    } else {
+      row.sides.add(contact.b.point, -1, first_of(row.soft_b));
+    }
     row.normal = place.normal;
-    row.start = row.place = place.at;
-    row.soft_sign = 1;
+    row.place = place.at;
+    row.start = row.sides.distance_of_particles(from);
     row.friction = contact.friction;
+    const std::vector<RememberedContact>& memory = island.bodies[row.soft_a]->implicit.contacts;
     if (const RememberedContact* known = find(memory, contact.a.point, row.normal)) start(row, known->force);
     add(row, place.gap, contact.deepest, contact.radius == 0);
   }
@@ -122,7 +144,7 @@ void ImplicitContacts::add(Row row, Real gap, Real deepest, bool bends) {
 
 bool ImplicitContacts::is_any_free(const ContactSides& sides) const {
   return std::any_of(sides.particles.begin(), sides.particles.begin() + sides.num_particles,
-                     [this](int i) { return body_.particles.inverse_masses[i] > 0; });
+                     [this](int i) { return inverse_masses_[i] > 0; });
 }
 
 // Of a point at `arm` from the centre of a body: of one that takes no impulse, by drifting; of another what is beyond the
@@ -136,16 +158,14 @@ Vector3 ImplicitContacts::way_of(const RigidBody& body, const Vector3& arm, bool
 }
 
 // Points that share particles, as those of an embedded surface do, share what these give way by.
-void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
+void ImplicitContacts::set_hardness() {
   const auto visit_free = [this](const Row& row, const auto& visit) {
     const ContactSides& sides = row.sides;
     for (int k = 0; k < sides.num_particles; ++k)
-      if (body_.particles.inverse_masses[sides.particles[k]] > 0)
-        visit(sides.particles[k], sides.weights[k] * sides.weights[k]);
+      if (inverse_masses_[sides.particles[k]] > 0) visit(sides.particles[k], sides.weights[k] * sides.weights[k]);
   };
-  shares_.assign(body_.particles.inverse_masses.size(), 0);
+  shares_.assign(inverse_masses_.size(), 0);
   for (const Row& row : rows_) visit_free(row, [this](int particle, Real weight2) { shares_[particle] += weight2; });
-  const bool is_free = newton.fixed().empty();
   for (Row& row : rows_) {
     if (row.presser >= 0) {
       const Matrix3 mobility = row.across * (row.a->inverse_inertia + row.b->inverse_inertia) * row.across;
@@ -153,10 +173,15 @@ void ImplicitContacts::set_hardness(const NewtonSolver& newton) {
       continue;
     }
     Real mobility = mobility_of(row.a, row.arm_a, row.normal) + mobility_of(row.b, row.arm_b, row.normal);
-    if (row.soft_sign != 0 && is_free) mobility += 1 / body_.mass;
+    if (row.soft_a != row.soft_b)
+      for (const int k : {row.soft_a, row.soft_b})
+        if (k >= 0 && island_.bodies[k]->implicit.newton.fixed().empty()) mobility += 1 / island_.bodies[k]->mass;
     Real softness = duration_ * duration_ * mobility;
     visit_free(row, [&](int particle, Real weight2) {
-      softness += 3 * weight2 * std::max<Real>(shares_[particle], 1) / newton.stiffness_of(particle).trace();
+      const int k = row.soft_b >= 0 && (row.soft_a < 0 || is_of(particle, row.soft_b)) ? row.soft_b : row.soft_a;
+      const ImplicitState& state = island_.bodies[k]->implicit;
+      const Matrix3 stiffness = state.newton.stiffness_of(particle - static_cast<int>(state.first));
+      softness += 3 * weight2 * std::max<Real>(shares_[particle], 1) / stiffness.trace();
     });
     row.hardness = row.hardening * hardness_share / softness;
   }
@@ -201,6 +226,7 @@ Real ImplicitContacts::evaluate(const PackedVectors& x, PackedVectors& gradient)
 
 void ImplicitContacts::linearize(const PackedVectors& x, std::vector<ContactStiffness>& stiffness,
                                  PackedVectors& forces) {
+  were_predicted_ = false;
   for (Row& row : rows_) {
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
@@ -211,6 +237,7 @@ void ImplicitContacts::linearize(const PackedVectors& x, std::vector<ContactStif
       row.sides.push(pull, forces);
       row.force += pull;
       pressed = row.hardness;
+      were_predicted_ = true;
     }
     row.is_predicted = false;
     row.stiffness = pressed * row.normal * row.normal.transpose() + row.hardness * given.rubbing_share * row.across;
@@ -257,8 +284,8 @@ void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settl
   }
 }
 
-void ImplicitContacts::finish(const PackedVectors& x, std::vector<RememberedContact>& memory) {
-  memory.clear();
+void ImplicitContacts::finish(const PackedVectors& x) {
+  for (SteppedBody* body : island_.bodies) body->implicit.contacts.clear();
   for (Row& row : rows_) {
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
@@ -278,21 +305,42 @@ void ImplicitContacts::finish(const PackedVectors& x, std::vector<RememberedCont
     outside_work_ += given.force.dot(row.driven) + std::max<Real>(given.force.dot(way), 0);
     if (row.a && row.a->is_dynamic()) row.a->give(impulse, row.arm_a.cross(impulse));
     if (row.b && row.b->is_dynamic()) row.b->give(-impulse, -row.arm_b.cross(impulse));
-    work_ += given.force.dot(row.sides.distance_of_particles(x) - row.start);
     if (row.rigid) continue;
-    impulse_ += row.soft_sign * impulse;
-    moment_ += row.soft_sign * row.place.cross(impulse);
+    give_to_soft(row, given, way, x);
     const Vector3 rubbed = given.force - given.pressing * row.normal;
     const bool slides = is_at_limit(rubbed.norm(), row.friction * given.pressing);
     ContactImpulse sum;
     (row.contact ? row.contact->given : sum).add(row.normal, duration_ * given.pressing, duration_ * rubbed, slides);
     if (row.contact)
-      memory.push_back({row.contact->a.point.particles, row.normal, given.force});
+      island_.bodies[row.soft_a]->implicit.contacts.push_back(
+          {row.contact->a.point.particles, row.normal, given.force});
     else
       island_.surface_scratch->records.push_back({row.features, row.thickness, sum});
   }
-  std::ranges::sort(memory, {}, &RememberedContact::particles);
+  for (SteppedBody* body : island_.bodies)
+    std::ranges::sort(body->implicit.contacts, {}, &RememberedContact::particles);
   remember_features();
+}
+
+void ImplicitContacts::give_to_soft(const Row& row, const Force& given, const Vector3& way, const PackedVectors& x) {
+  const bool is_within = row.soft_a == row.soft_b, is_between = !is_within && row.soft_a >= 0 && row.soft_b >= 0;
+  const Vector3 impulse = duration_ * given.force;
+  for (const auto& [k, sign] : {std::pair(row.soft_a, 1), std::pair(row.soft_b, -1)}) {
+    if (k < 0) continue;
+    GivenInStep& sum = given_[k];
+    for (int i = 0; i < row.sides.num_particles; ++i)
+      if (const int particle = row.sides.particles[i]; !is_between || is_of(particle, k))
+        sum.work += row.sides.weights[i] * given.force.dot((x.col(particle) - from_.col(particle)).head<3>());
+    sum.loss += std::max<Real>(-given.force.dot(way), 0);
+    if (is_within) break;
+    sum.impulse += sign * impulse;
+    sum.moment += sign * row.place.cross(impulse);
+  }
+}
+
+bool ImplicitContacts::is_of(int particle, int body) const {
+  const Eigen::Index first = first_of(body);
+  return particle >= first && particle < first + island_.bodies[body]->particles.size();
 }
 
 void ImplicitContacts::give_moment(const Row& row, const Vector3& moment, const Vector3& way) {

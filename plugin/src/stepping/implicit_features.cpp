@@ -49,28 +49,32 @@ void ImplicitContacts::add(const SurfaceContact& contact, FeaturePair& q, Real r
   if (row.normal.isZero(0)) return;
   Vector3 at = Vector3::Zero(), approach = Vector3::Zero();
   for (int k = 0; k < 4; ++k) {
-    const ContactSurface& surface = k < (q.are_edges ? 2 : 1) ? pair.first(q) : pair.second(q);
+    const ContactSurface& surface = pair.surface_of(q, k);
     approach += closest.weights[k] * surface.velocity(q.points[k]);
     if (surface.is_rigid()) continue;
-    row.sides.add(surface.points()[q.points[k]], closest.weights[k]);
+    const bool is_of_first = k < (q.are_edges ? 2 : 1);
+    int& body = is_of_first ? row.soft_a : row.soft_b;
+    body = is_of_first == q.from_b ? contact.body_b : contact.body_a;
+    row.sides.add(surface.points()[q.points[k]], closest.weights[k], first_of(body));
     at += std::abs(closest.weights[k]) * surface.position(q.points[k]);
   }
+  if (row.soft_a >= 0 && row.soft_b >= 0) at /= 2;
   const Real near = near_share * (q.thickness - pair.b().radius());
   if (q.distance > q.thickness + near - std::min<Real>(row.normal.dot(approach), 0)) return;
   bool moves = is_any_free(row.sides);
   row.place = at;
   row.friction = pair.friction();
-  row.start = row.sides.distance_of_particles(body_.particles.positions);
+  row.start = row.sides.distance_of_particles(from_);
   if (contact.rigid >= 0) {
     RigidBody& body = island_.rigid_bodies[contact.rigid];
     const bool is_first = pair.first(q).is_rigid();
     const Vector3 arm = at - surfaces_->center_of(body);
-    row.soft_sign = is_first ? -1 : 1;
     (is_first ? row.a : row.b) = &body;
     (is_first ? row.arm_a : row.arm_b) = arm;
     row.place = body.position + arm;
     if (const Eigen::Index column = column_of(body, island_); column >= 0) {
-      row.sides.rigid[row.sides.num_rigid++] = {.column = static_cast<int>(column), .sign = -row.soft_sign, .arm = arm};
+      row.sides.rigid[row.sides.num_rigid++] = {
+          .column = static_cast<int>(column), .sign = is_first ? Real(1) : Real(-1), .arm = arm};
       moves = true;
     }
   }
@@ -86,7 +90,9 @@ void ImplicitContacts::add(const SurfaceContact& contact, FeaturePair& q, Real r
     row.hardening = old->hardening;
     row.last_gap = old->last_gap;
     row.is_new = old->is_new;
+    row.memory = old->memory;
   } else {
+    row.memory = q.memory;
     if (!q.memory.is_empty()) start(row, q.memory.start(1));
     predict(row);
   }
@@ -118,14 +124,16 @@ Real ImplicitContacts::longest(const PackedVectors& direction) {
   return share;
 }
 
+// What is not a row, is not near, or was not for a while: what it remembers is of another step.
 void ImplicitContacts::remember_features() {
-  if (surfaces_)
-    surfaces_->visit_near([this](const SurfaceContact& contact, FeaturePair& q, Real) {
-      if (const Row* row = row_of(rows_of_surfaces(), features_of(island_, contact, q)))
-        q.memory.keep(duration_ * row->force, row->normal, duration_);
-      else
-        q.memory = {};
-    });
+  if (!surfaces_) return;
+  for (const SurfaceContact& contact : island_.surfaces) contact.pair->forget_memory();
+  surfaces_->visit_near([this](const SurfaceContact& contact, FeaturePair& q, Real) {
+    if (const Row* row = row_of(rows_of_surfaces(), features_of(island_, contact, q))) {
+      q.memory = row->memory;
+      q.memory.keep(duration_ * row->force, row->normal, duration_);
+    }
+  });
 }
 
 }  // namespace penalty

@@ -1,4 +1,4 @@
-// One step by backward Euler of a soft body and what it touches.
+// One step by backward Euler of soft bodies and what they touch.
 #pragma once
 #include "penalty/stepping/island.h"
 
@@ -6,7 +6,7 @@ namespace penalty {
 
 class ImplicitSurfaces;
 
-/// Of an island of one soft body and of rigid ones. `surfaces`: those that may touch in this step; null: none.
-void advance_implicitly(Island& island, ImplicitSurfaces* surfaces, Real duration);
+/// Of an island of soft bodies and of rigid ones. Returns false, with all where it was, if surfaces cannot be kept apart so.
+bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duration);
 
 }  // namespace penalty

@@ -19,7 +19,8 @@ Matrix3 rotation_of(const Vector3& turn) {
 
 Eigen::Index column_of(const RigidBody& body, const Island& island) {
   if (!body.is_dynamic()) return -1;
-  Eigen::Index column = island.bodies.front()->particles.size();
+  Eigen::Index column = 0;
+  for (const SteppedBody* soft : island.bodies) column += soft->particles.size();
   for (const RigidBody& other : island.rigid_bodies) {
     if (&other == &body) break;
     if (other.is_dynamic()) column += 2;
@@ -58,7 +59,9 @@ void ImplicitSurfaces::refresh() {
 }
 
 Real ImplicitSurfaces::aim(const PackedVectors& displacement) {
-  surfaces_.visit_soft([&](ContactSurface& surface, const SteppedBody&) { surface.take_velocities(displacement); });
+  surfaces_.visit_soft([&](ContactSurface& surface, const SteppedBody& body) {
+    surface.take_velocities(displacement, body.implicit.first);
+  });
   surfaces_.visit_rigid([&](ContactSurface& surface, const RigidBody& body) {
     const Eigen::Index column = column_of(body, island_);
     if (column < 0) return;
@@ -74,10 +77,39 @@ Real ImplicitSurfaces::aim(const PackedVectors& displacement) {
   return share;
 }
 
+bool ImplicitSurfaces::meet(const PackedVectors& displacement) {
+  begin(displacement.cols());
+  bool do_meet = aim(displacement) < 1;
+  visit_near([&do_meet](const SurfaceContact& contact, FeaturePair& q, Real reach) {
+    if (do_meet || q.distance > q.thickness + reach) return;
+    const ClosestPoints closest = contact.pair->find_closest(q);
+    Vector3 way = Vector3::Zero();
+    for (int k = 0; k < 4; ++k) way += closest.weights[k] * contact.pair->surface_of(q, k).velocity(q.points[k]);
+    do_meet = q.distance + contact.pair->direction(q, closest).dot(way) < q.thickness;
+  });
+  return do_meet;
+}
+
+void ImplicitSurfaces::pass(const PackedVectors& from) {
+  surfaces_.visit_soft([&from](ContactSurface& surface, const SteppedBody& body) {
+    const Eigen::Index first = body.implicit.first, count = body.particles.size();
+    surface.take_velocities(PackedVectors(body.particles.positions - from.middleCols(first, count)));
+  });
+  take_ways_to_rigid_bodies();
+  surfaces_.drift(1);
+  surfaces_.take_positions();
+}
+
+void ImplicitSurfaces::take_ways_to_rigid_bodies() {
+  surfaces_.visit_rigid(
+      [](ContactSurface& surface, const RigidBody& body) { surface.take_way_to(body.position, body.rotation); });
+}
+
 void ImplicitSurfaces::move(Real share, const PackedVectors& x) {
   surfaces_.drift(share);
   at_ = x;
-  surfaces_.visit_soft([&](ContactSurface& surface, const SteppedBody&) { surface.take_positions(x); });
+  surfaces_.visit_soft(
+      [&](ContactSurface& surface, const SteppedBody& body) { surface.take_positions(x, body.implicit.first); });
   surfaces_.visit_rigid([&](ContactSurface& surface, const RigidBody& body) {
     if (const Eigen::Index column = column_of(body, island_); column >= 0)
       surface.take_positions(center_of(body), rotation_of(x.col(column + 1).head<3>()) * body.rotation);
@@ -89,8 +121,7 @@ bool ImplicitSurfaces::end() {
   surfaces_.visit_soft([](ContactSurface& surface, const SteppedBody& body) {
     surface.take_velocities(PackedVectors::Zero(4, body.particles.size()));
   });
-  surfaces_.visit_rigid(
-      [](ContactSurface& surface, const RigidBody& body) { surface.take_way_to(body.position, body.rotation); });
+  take_ways_to_rigid_bodies();
   refresh();
   visit_near([&](const SurfaceContact& contact, FeaturePair& q, Real reach) {
     is_separated = is_separated && contact.pair->separated_share(q, 1, reach) == 1;
@@ -105,7 +136,7 @@ Real ImplicitSurfaces::distance_at_start(const SurfaceContact& contact, const Fe
   std::array<Vector3, 4> x;
   for (int k = 0; k < 4; ++k) {
     const bool is_of_first = k < (q.are_edges ? 2 : 1);
-    const ContactSurface& surface = is_of_first ? pair.first(q) : pair.second(q);
+    const ContactSurface& surface = pair.surface_of(q, k);
     if (surface.is_rigid()) {
       const RigidBody& body = island_.rigid_bodies[contact.rigid];
       x[k] = body.position + body.rotation * surface.rest_position(q.points[k]);

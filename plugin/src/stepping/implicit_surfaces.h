@@ -14,6 +14,9 @@ class ImplicitSurfaces {
  public:
   explicit ImplicitSurfaces(Island& island) : island_(island), surfaces_(island) {}
 
+  bool are_near = false;     // they may touch, as bodies move now
+  bool may_be_near = false;  // if not, but by what acts on these, their contacts may be taken implicitly
+
   /// Whether their contacts can be taken implicitly, in a step of `duration` [s]: nothing has to be led out of anything, what
   /// is held stands still, and nothing spins.
   bool can_step(Real duration) const;
@@ -25,12 +28,19 @@ class ImplicitSurfaces {
   /// What bodies are to do next. Returns which share of that they may do.
   Real aim(const PackedVectors& displacement);
 
+  /// Whether some of them would come as near as they touch, or through each other, if they did all of this from where the step
+  /// began.
+  bool meet(const PackedVectors& displacement);
+
   /// They did this share of it and are at `x`.
   void move(Real share, const PackedVectors& x);
 
   /// The step is over, and rigid bodies, not far from where they should be, are where the island says. Returns whether
   /// that is as far as the planes allow.
   bool end();
+
+  /// The step, from there on, is over, and they did not meet.
+  void pass(const PackedVectors& from);
 
   /// Calls visit(contact, features, reach) for what may come as near as `reach` [m] beyond its thickness, by what bodies
   /// were to do last.
@@ -51,6 +61,7 @@ class ImplicitSurfaces {
 
  private:
   void refresh();
+  void take_ways_to_rigid_bodies();
 
   Island& island_;
   IslandSurfaces surfaces_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "explicit_step.h"
 #include "implicit_step.h"
@@ -15,30 +16,40 @@ namespace {
 
 // All of it slower than what comes to rest, seen from what holds it up.
 bool lies(const Island& island) {
-  const SteppedBody& body = *island.bodies.front();
   const RigidBody still, *ground = &still;
   for (const Contact& contact : island.contacts)
-    if (const RigidBody& rigid = island.rigid_bodies[contact.b.rigid]; !rigid.is_dynamic()) ground = &rigid;
-  const Real limit = body.options.settling_speed * std::sqrt(body.gravity.norm() * body.size);
+    if (contact.b.is_rigid() && !island.rigid_bodies[contact.b.rigid].is_dynamic())
+      ground = &island.rigid_bodies[contact.b.rigid];
+  Real limit = std::numeric_limits<Real>::infinity();
+  for (const SteppedBody* body : island.bodies)
+    limit = std::min(limit, body->options.settling_speed * std::sqrt(body->gravity.norm() * body->size));
   const auto is_slow = [&](const Vector3& position, const Vector3& velocity) {
     return (velocity - ground->velocity_at(position - ground->position)).norm() < limit;
   };
   for (const RigidBody& rigid : island.rigid_bodies)
     if (rigid.is_dynamic() && !is_slow(rigid.position, rigid.velocity)) return false;
-  for (int i = 0; i < body.particles.size(); ++i)
-    if (!is_slow(body.particles.positions.col(i).head<3>(), body.particles.velocities.col(i).head<3>())) return false;
+  for (const SteppedBody* body : island.bodies)
+    for (int i = 0; i < body->particles.size(); ++i)
+      if (!is_slow(body->particles.positions.col(i).head<3>(), body->particles.velocities.col(i).head<3>()))
+        return false;
   return true;
 }
 
-// An impact is for substeps, as long as they can be taken: backward Euler would eat the rebound.
+// An impact is for substeps, as long as they can be taken: backward Euler would eat the rebound. All bodies take as many as
+// that which needs most.
 bool wants_implicit_step(const Island& island, Real duration, bool touches) {
-  const SteppedBody& body = *island.bodies.front();
-  if (body.particles.size() == 0) return false;
-  if (body.options.integrator != Integrator::automatic) return body.options.integrator == Integrator::implicit_step;
-  const Real limit = duration * std::sqrt(body.largest_eigenvalue) / 2;
-  const Real share = touches ? body.options.contact_safety : body.options.safety;
-  if (body.options.substeps != 0 || !(limit > crossover_substeps * share)) return false;
-  return !touches || limit > body.options.max_substeps || lies(island);
+  bool is_automatic = false, pays = false, is_too_stiff = false;
+  for (const SteppedBody* body : island.bodies) {
+    if (body->particles.size() == 0 || body->options.integrator == Integrator::explicit_step) return false;
+    if (body->options.integrator != Integrator::automatic) continue;
+    if (body->options.substeps != 0) return false;
+    const Real limit = duration * std::sqrt(body->largest_eigenvalue) / 2;
+    const Real share = touches ? body->options.contact_safety : body->options.safety;
+    is_automatic = true;
+    pays = pays || limit > crossover_substeps * share;
+    is_too_stiff = is_too_stiff || limit > body->options.max_substeps;
+  }
+  return !is_automatic || (pays && (!touches || is_too_stiff || lies(island)));
 }
 
 bool may_bounce(const RigidContact& contact, const Island& island) {
@@ -49,10 +60,7 @@ bool may_bounce(const RigidContact& contact, const Island& island) {
 }
 
 bool may_step_implicitly(const Island& island) {
-  if (island.bodies.size() != 1 || !island.couplings.empty() || !island.anchors.empty() || !island.joints.empty())
-    return false;
-  for (const Contact& contact : island.contacts)
-    if (!contact.b.is_rigid()) return false;
+  if (!island.couplings.empty() || !island.anchors.empty() || !island.joints.empty()) return false;
   for (const RigidBody& rigid : island.rigid_bodies)
     if (rigid.is_dynamic() && !rigid.is_free()) return false;
   return std::ranges::none_of(island.rigid_contacts,
@@ -65,8 +73,8 @@ StepReport report_of(const Island& island) {
     const StepReport& report = body->report;
     sum.integrator = report.integrator;
     sum.substeps = std::max(sum.substeps, report.substeps);
-    sum.newton_iterations += report.newton_iterations;
-    sum.linear_iterations += report.linear_iterations;
+    sum.newton_iterations = std::max(sum.newton_iterations, report.newton_iterations);
+    sum.linear_iterations = std::max(sum.linear_iterations, report.linear_iterations);
     sum.unfolded = sum.unfolded || report.unfolded;
     sum.retries = std::max(sum.retries, report.retries);
     sum.finite = sum.finite && report.finite;
@@ -92,11 +100,9 @@ StepReport advance(Island& island, Real duration) {
     SurfaceContacts surfaces(island);
     surfaces.begin_step(duration);
     ImplicitSurfaces near(island);
-    const bool are_near = surfaces.least_substeps() > 1;
-    if (!are_near || (wants_implicit_step(island, duration, true) && near.can_step(duration))) {
-      advance_implicitly(island, are_near ? &near : nullptr, duration);
-      return report_of(island);
-    }
+    near.are_near = surfaces.least_substeps() > 1;
+    near.may_be_near = near.can_step(duration) && wants_implicit_step(island, duration, true);
+    if ((!near.are_near || near.may_be_near) && advance_implicitly(island, near, duration)) return report_of(island);
   }
   advance_explicitly(island, duration);
   return report_of(island);

@@ -70,11 +70,12 @@ RelaxReport relax(PotentialField& field, PackedVectors& positions, const RelaxOp
     report.unfolded = unfold(positions, rest, affine_span(rest), inverse_masses);
   }
 
+  NewtonBody body;
+  body.set_pattern(field);
+  for (const int i : pinned) body.fix(i);
+  body.loads = options.loads;
   NewtonSolver newton;
-  newton.set_pattern(field);
-  for (const int i : pinned) newton.fix(i);
-  newton.objective.field = &field;
-  newton.objective.loads = options.loads;
+  newton.objective.bodies = {&body};
   newton.linear = options.linear;
   newton.regularization = regularization;
   newton.prepare();

@@ -21,6 +21,9 @@ struct RigidState {
 
   /// The angular velocity of least energy with an angular momentum [rad/s].
   Vector3 angular_velocity(const Vector3& angular_momentum) const { return inverse_inertia() * angular_momentum; }
+
+  /// Of the rigid motion [J].
+  Real kinetic_energy() const { return (momentum.squaredNorm() / mass + spin.dot(angular_velocity(spin))) / 2; }
 };
 
 }  // namespace penalty

@@ -61,10 +61,10 @@ class ContactSurface {
   Real friction = 0;  // Coulomb coefficient, to be multiplied with the other's
 
   /// Takes the points from where the particles are now; before a step it forgets what was known if that is not where the
-  /// last drift left them: somebody else moved them.
+  /// last drift left them: somebody else moved them. `first`: the column of the first particle of the body.
   void begin_step(const PackedVectors& positions);
-  void take_positions(const PackedVectors& positions);
-  void take_velocities(const PackedVectors& velocities);
+  void take_positions(const PackedVectors& positions, Eigen::Index first = 0);
+  void take_velocities(const PackedVectors& velocities, Eigen::Index first = 0);
 
   /// The same of a rigid body: where its frame is, and how it moves about its origin [m/s], [rad/s]. A move by others that
   /// is small against the margin, as round-off is, counts as one of its own.

@@ -47,6 +47,10 @@ class SurfacePair {
   bool is_self() const { return a_ == b_; }
   const ContactSurface& first(const FeaturePair& q) const { return q.from_b ? *b_ : *a_; }
   const ContactSurface& second(const FeaturePair& q) const { return q.from_b ? *a_ : *b_; }
+  /// That of q.points[k].
+  const ContactSurface& surface_of(const FeaturePair& q, int k) const {
+    return k < (q.are_edges ? 2 : 1) ? first(q) : second(q);
+  }
 
   /// That is kept, beyond the radius of a rigid surface, where rest shapes leave room for it [m].
   Real thickness() const { return thickness_; }
@@ -80,6 +84,12 @@ class SurfacePair {
         if (q.found_at == instant()) q.floor = q.distance + couple.moved;
       }
     }
+  }
+
+  /// No features remember anything.
+  void forget_memory() {
+    for (Couple& couple : couples_)
+      for (FeaturePair& q : couple.near) q.memory = {};
   }
 
   ClosestPoints closest(const FeaturePair& q) const;

@@ -23,10 +23,11 @@ struct WeightedPoint {
   /// `num_particles`, no two of them the same, and their weights are finite and sum to one.
   void check(int num_particles, const std::string& what) const;
 
-  /// What `vectors`, one column a particle, say of the point.
-  Vector3 of(const PackedVectors& vectors) const {
+  /// What `vectors`, one column a particle from `first` on, say of the point.
+  Vector3 of(const PackedVectors& vectors, Eigen::Index first = 0) const {
     Vector3 sum = Vector3::Zero();
-    for (int k = 0; k < size; ++k) sum += weights[k] * Eigen::Map<const Vector3>(vectors.data() + 4 * particles[k]);
+    for (int k = 0; k < size; ++k)
+      sum += weights[k] * Eigen::Map<const Vector3>(vectors.data() + 4 * (first + particles[k]));
     return sum;
   }
   Vector3 of(const Vectors& vectors) const = delete;  // would copy them all, at every call

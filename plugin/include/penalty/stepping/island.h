@@ -21,6 +21,7 @@
 namespace penalty {
 
 class SurfacePair;
+struct ImplicitContactScratch;
 struct ParticleContactRow;
 struct SurfaceScratch;
 
@@ -32,11 +33,18 @@ struct RememberedContact {
 
 /// What implicit steps keep between steps.
 struct ImplicitState {
-  NewtonSolver newton;
+  NewtonBody newton;
   std::vector<RememberedContact> contacts, contacts_at_start;  // sorted by particles
   PackedVectors acceleration;                                  // mean one of the last step [m/s²]
   bool has_acceleration = false;
-  PackedVectors from, guess;  // what the step works in
+
+  // What the step works in: of the body,
+  Eigen::Index first = 0;  // column of its first particle among the unknowns of the island
+  // and of the island that it is the first body of.
+  NewtonSolver solver;
+  PackedVectors from, guess;
+  std::vector<Real> enough;
+  std::shared_ptr<ImplicitContactScratch> contact_scratch;
 };
 
 /// A soft body: its state, its field and what the integrator remembers of it between steps. The field outlives the
@@ -151,7 +159,7 @@ void estimate_stability(Coupling& coupling, const Island& island, bool anew);
 /// Hits of bodies with restitution are followed from step to step, and what they give back changes the velocities at the
 /// end of a step.
 ///
-/// Implicitly, one soft body and the rigid ones that it touches, see Integrator: the positions at the end minimise
+/// Implicitly, soft bodies and the rigid ones that they touch, see Integrator: the positions at the end minimise
 ///
 ///     Phi(x) = sum_i m_i / 2h² |x_i - (x + h v + h² a)_i|² + E(x) + (x - x0)ᵀ D (x - x0) / 2h + contacts
 ///

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "penalty/contact/weighted_point.h"
-#include "penalty/fields/system.h"
+#include "penalty/stepping/body_matrix.h"
 #include "penalty/stepping/step_options.h"
 
 namespace penalty {
@@ -28,15 +28,17 @@ struct ContactSides {
   bool turn = false;
   int num_rigid = 0, num_particles = 0;
   std::array<OnRigid, 2> rigid = {};
-  std::array<int, most_particles> particles{};
-  std::array<Real, most_particles> weights{};  // w_k
+  std::array<int, most_particles> particles{};  // their columns
+  std::array<Real, most_particles> weights{};   // w_k
 
   /// Adds a point with this weight, which is negative on the second side; points may share particles.
-  void add(const WeightedPoint& point, Real weight) {
+  /// `first`: the column of the first particle of its body.
+  void add(const WeightedPoint& point, Real weight, Eigen::Index first = 0) {
     for (int k = 0; k < point.size; ++k) {
+      const int column = static_cast<int>(first) + point.particles[k];
       int at = 0;
-      while (at < num_particles && particles[at] != point.particles[k]) ++at;
-      if (at == num_particles) particles[num_particles++] = point.particles[k];
+      while (at < num_particles && particles[at] != column) ++at;
+      if (at == num_particles) particles[num_particles++] = column;
       weights[at] += weight * point.weights[k];
     }
   }
@@ -76,15 +78,25 @@ struct RigidInertia {
   Matrix3 rotation;     // [N m]
 };
 
-/// A positive definite system: matrix + rigid bodies + contacts. The columns of particles come first, then two for each
-/// rigid body. Particles in `fixed`, sorted, do not move: their rows and columns count as those of the identity.
+/// A positive definite system: matrices of soft bodies + rigid bodies + contacts. The columns of particles come first, body
+/// by body, then two for each rigid body. The rows and columns of particles that do not move count as those of the identity.
 struct LinearSystem {
-  System matrix;
+  std::vector<const BodyMatrix*> bodies = {};
   std::vector<RigidInertia> rigid_bodies = {};
   std::vector<ContactStiffness> contacts = {};
-  std::vector<int> fixed = {};
 
-  int num_columns() const { return matrix.num_particles() + 2 * static_cast<int>(rigid_bodies.size()); }
+  Eigen::Index num_particles() const;
+  Eigen::Index num_columns() const { return num_particles() + 2 * static_cast<Eigen::Index>(rigid_bodies.size()); }
+
+  /// Calls visit(body, first, count) with the columns of each body.
+  template <class Visit>
+  void visit_bodies(const Visit& visit) const {
+    Eigen::Index first = 0;
+    for (const BodyMatrix* body : bodies) {
+      visit(*body, first, Eigen::Index(body->num_particles()));
+      first += body->num_particles();
+    }
+  }
 
   /// y = A x but for the rows of fixed particles, which are zero; those of x are to be zero.
   void multiply(const PackedVectors& x, PackedVectors& y) const;
@@ -93,57 +105,40 @@ struct LinearSystem {
   void clear_fixed(PackedVectors& v) const;
 };
 
-struct LinearReport {
-  int iterations = 0;
-  Real squared_norm = 0;  // b . P⁻¹ b, P the preconditioner
-};
-
 /// Preconditioned conjugate gradients. The preconditioner is additive: the inverses of the 3 x 3 blocks on the diagonal
-/// take care of what is stiff and near, and a coarse space of what is smooth: the particles in groups of neighbours,
-/// each of which moves as a rigid body (6 unknowns a group, a dense Cholesky factorisation); rigid bodies are groups, too.
-/// Deterministic, and without allocation once a system of the same size has been solved.
+/// take care of what is stiff and near, and a coarse space of what is smooth: the groups of each BodyMatrix, which move as
+/// rigid bodies (6 unknowns a group, a dense Cholesky factorisation); rigid bodies are groups, too. Deterministic, and
+/// without allocation once a system of the same size has been solved.
 class LinearSolver {
  public:
-  /// Makes the groups from the pattern of the matrix.
-  void set_pattern(const BlockMatrix& matrix);
+  /// Prepares the preconditioner for the values of the system, whose bodies have made their parts of it.
+  void factorize(const LinearSystem& system);
 
-  /// Prepares the preconditioner for the values of the system, with particles at `x` [m].
-  void factorize(const LinearSystem& system, const Positions& x);
-
-  /// The same, where nothing but the contacts has changed since.
-  void factorize_contacts(const LinearSystem& system);
-
-  /// Solves A x = b from x = 0; the columns of fixed particles become zero. Whatever the number of iterations, b . x >
-  /// 0 unless b is zero or not finite.
-  LinearReport solve(const LinearSystem& system, const PackedVectors& b, const LinearOptions& options,
-                     PackedVectors& x);
+  /// Solves A x = b from x = 0; the columns of fixed particles become zero. Returns the number of iterations; whatever it
+  /// is, b . x > 0 unless b is zero or not finite.
+  int solve(const LinearSystem& system, const PackedVectors& b, const LinearOptions& options, PackedVectors& x);
 
   /// r . P⁻¹ r, P the preconditioner.
-  Real squared_norm(const LinearSystem& system, const PackedVectors& r);
+  Real squared_norm(const PackedVectors& r);
   /// What some columns have of that, when it was computed last.
   Real share_of_norm(const PackedVectors& r, Eigen::Index first, Eigen::Index count) const {
     return r.middleCols(first, count).cwiseProduct(preconditioned_.middleCols(first, count)).sum();
   }
 
-  /// Of particles.
-  int num_groups() const { return static_cast<int>(group_begin_.empty() ? 0 : group_begin_.size() - 1); }
-
  private:
-  void precondition(const LinearSystem& system, const PackedVectors& r, PackedVectors& z);
-  void sum_blocks(const LinearSystem& system);
-  void sum_coarse_blocks(const LinearSystem& system, const Positions& x);
+  void precondition(const PackedVectors& r, PackedVectors& z);
+  void gather(const LinearSystem& system);
   void invert_diagonal(const LinearSystem& system);
   void factorize_coarse(const LinearSystem& system);
-  void add_coarse_block(int i, int j, const Matrix3& block);
-  void add_coarse_contact(const LinearSystem& system, const ContactStiffness& contact);
+  void add_coarse_contact(const ContactStiffness& contact);
 
+  Eigen::Index num_particles_ = 0;
+  int num_groups_ = 0;         // of particles
   std::vector<int> group_of_;  // of each particle
-  std::vector<int> group_begin_, group_members_;
-  std::vector<Matrix3> diagonal_, inverse_diagonal_;  // the first without contacts
-  PackedVectors arms_;                                // from the centre of the group, in units of its size
-  std::vector<Real> moves_;                           // 1, of fixed particles 0
-  Eigen::MatrixXd coarse_blocks_;                     // the coarse matrix without contacts, lower triangle
-  Eigen::MatrixXd coarse_;                            // its Cholesky factor, contacts included, in the lower triangle
+  std::vector<Real> moves_;    // 1, of fixed particles 0
+  PackedVectors arms_;         // from the centre of the group, in units of its size
+  std::vector<Matrix3> inverse_diagonal_;
+  Eigen::MatrixXd coarse_;  // the Cholesky factor of the coarse matrix, in the lower triangle
   Eigen::VectorXd coarse_scale_, coarse_vector_;
   std::vector<std::pair<int, Eigen::Matrix<Real, 3, 6>>> coarse_motions_;  // of a contact: by group
   PackedVectors residual_, preconditioned_, search_, product_;

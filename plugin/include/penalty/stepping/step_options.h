@@ -7,8 +7,9 @@ namespace penalty {
 enum class Integrator {
   automatic,  // explicit up to `crossover_substeps`, else implicit; in contact only what lies, or is too stiff to bounce
   explicit_step,  // sub-cycled velocity Verlet
-  implicit_step,  // backward Euler, with what it touches; explicit where that is another soft body, edges that are driven or
-                  // spin, a rigid body that is jointed, held along an axis or rebounds, and in couplings
+  implicit_step,  // backward Euler, with what it touches; explicit where that is edges that are driven or spin, a rigid body
+  // that is jointed, held along an axis or rebounds, or a soft one that is explicit, where surfaces cross
+  // from the start, and in couplings
 };
 
 /// Substeps up to which sub-cycling costs less than an implicit step with its default options: as many were measured to

@@ -1,0 +1,83 @@
+// The part of BackwardEuler that sets momenta and energy right.
+#include <algorithm>
+#include <cmath>
+
+#include "backward_euler.h"
+#include "implicit_contacts.h"
+#include "rigid_state.h"
+
+namespace penalty {
+namespace {
+
+constexpr Real sum_round_off = 1e-12;  // of a sum of forces, relative to the sum of their magnitudes
+
+}  // namespace
+
+// What the minimum, and iterations that end before it, take from the momenta of a free body.
+void BackwardEuler::restore_momenta(std::size_t k, const RigidState& before, const ImplicitContacts& contacts) {
+  SteppedBody& body = *island_.bodies[k];
+  Particles& particles = body.particles;
+  // Of the potential: only what acts from outside leaves any.
+  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();
+  Real forces = 0, torques = 0;
+  const auto all_forces = columns_of(body, newton_.forces()), positions = columns_of(body, newton_.positions());
+  for (int i = 0; i < particles.size(); ++i) {
+    const Vector3 f = all_forces.col(i).head<3>(), arm = positions.col(i).head<3>() - before.center;
+    force += f;
+    torque += arm.cross(f);
+    forces += f.norm();
+    torques += arm.norm() * f.norm();
+  }
+  if (force.norm() < sum_round_off * forces) force.setZero();
+  if (torque.norm() < sum_round_off * torques) torque.setZero();
+  const GivenInStep& given = contacts.given_to(k);
+  Vector3 momentum = before.momentum + duration_ * (before.mass * body.gravity + force) + given.impulse;
+  Vector3 spin = before.spin + duration_ * torque + given.moment_about(before.center);
+  if (body.external_forces.size() != 0)
+    for (int i = 0; i < particles.size(); ++i) {
+      const Vector3 impulse = duration_ * body.external_forces.col(i).head<3>();
+      momentum += impulse;
+      spin += (state_.from.col(body.implicit.first + i).head<3>() - before.center).cross(impulse);
+    }
+  const RigidState now(particles);
+  if (contacts.touch_immovable())
+    spin = now.spin;  // is no longer its own: given back on a way that obstacles bend, it would gain energy
+  else if (touches_)
+    spin -= (now.center - before.center).cross(momentum);
+  const Vector3 dv = (momentum - now.momentum) / now.mass, dw = now.angular_velocity(spin - now.spin);
+  body.report.restored_momentum = (momentum - now.momentum).norm();
+  body.report.restored_spin = (spin - now.spin).norm();
+  for (int i = 0; i < particles.size(); ++i) {
+    const Vector3 arm = particles.positions.col(i).head<3>() - now.center;
+    particles.velocities.col(i).head<3>() += dv + dw.cross(arm);
+    if (!touches_) particles.positions.col(i).head<3>() += duration_ * dv;
+  }
+}
+
+void BackwardEuler::cap_energy(Real allowed) {
+  Real excess = -allowed, at_hand = 0;  // the energies of what may be taken
+  for (const SteppedBody* body : island_.bodies) {
+    const Real kinetic = kinetic_energy(body->particles);
+    excess += body->elastic_energy + kinetic;
+    at_hand += kinetic - (is_free(*body) ? RigidState(body->particles).kinetic_energy() : 0);
+  }
+  for (SteppedBody* body : island_.bodies) body->report.capped_energy = 0;
+  if (!(excess > 0) || !(at_hand > 0)) return;
+  const Real share = std::sqrt(std::max<Real>(0, 1 - excess / at_hand));
+  for (SteppedBody* body : island_.bodies) {
+    Particles& particles = body->particles;
+    const Real before = kinetic_energy(particles);
+    const RigidState rigid = is_free(*body) ? RigidState(particles) : RigidState();
+    const Vector3 velocity = is_free(*body) ? Vector3(rigid.momentum / rigid.mass) : Vector3::Zero(),
+                  turn = is_free(*body) ? rigid.angular_velocity(rigid.spin) : Vector3::Zero();
+    for (int i = 0; i < particles.size(); ++i) {
+      if (!(particles.inverse_masses[i] > 0)) continue;
+      const Vector3 as_rigid = velocity + turn.cross(Vector3(particles.positions.col(i).head<3>() - rigid.center));
+      auto v = particles.velocities.col(i).head<3>();
+      v = as_rigid + share * (v - as_rigid);
+    }
+    body->report.capped_energy = before - kinetic_energy(particles);
+  }
+}
+
+}  // namespace penalty
