@@ -6,9 +6,9 @@ namespace {
 
 class Anchors : public WorldTest {
  protected:
-  btSoftBody& add_box(const Vector3& at) {
+  btSoftBody& add_box(const Vector3& at, Integrator integrator = Integrator::automatic) {
     return sim.add_jelly(make_box({0.6, 0.4, 0.6}, {3, 2, 3}),
-                         {.shift = at, .attach = {.step = {.damping_time = 0.01}}});
+                         {.shift = at, .attach = {.step = {.integrator = integrator, .damping_time = 0.01}}});
   }
 
   // The nodes where `holds` says so, at where they are.
@@ -90,6 +90,30 @@ TEST_P(Anchors, ToAFreeBodyKeepMomentaAndEnergy) {
       const Totals after = sim.totals();
       EXPECT_LT((after.momentum - before.momentum).norm(), limit(1e-11, 1e-5));
       EXPECT_LT((after.angular_momentum - before.angular_momentum).norm(), limit(1e-11, 1e-4));
+      anchored_.clear();
+      sim.remove(body);
+      sim.remove(box);
+    }
+}
+
+TEST_P(Anchors, HoldInImplicitSteps) {
+  for (const bool is_free : {false, true})
+    for (const bool deformable : {false, true}) {
+      SCOPED_TRACE(is_free);
+      sim.set_gravity(is_free ? Vector3(0, 0, 0) : Vector3(0, -9.81, 0));
+      btSoftBody& body = add_box({0, 1, 0}, Integrator::implicit_step);
+      btRigidBody& box = sim.add_box({0.1, 0.1, 0.1}, is_free ? 1 : 0, {0.3, 1.6, 0.1});
+      if (is_free)
+        for (int i = 0; i < body.m_nodes.size(); ++i) body.m_nodes[i].m_v = btVector3(1, 2, -1);
+      anchor(body, box, deformable, at_two_corners);
+      sim.penalty().synchronize(body);
+      const Totals before = sim.totals();
+      expect_to_hold(120);
+      EXPECT_EQ(sim.penalty().report(body).integrator, Integrator::implicit_step);
+      if (is_free) {
+        EXPECT_LT((sim.totals().momentum - before.momentum).norm(), limit(1e-11, 1e-5));
+        EXPECT_LT((sim.totals().angular_momentum - before.angular_momentum).norm(), limit(1e-11, 1e-4));
+      }
       anchored_.clear();
       sim.remove(body);
       sim.remove(box);

@@ -19,11 +19,11 @@ struct Fall {
   Fall(WorldKind kind, Real stiffness, Real height, Integrator integrator)
       : sim(kind), ground(sim.add_ground()), body(add(stiffness, height, integrator)), start(sim.totals().energy) {}
 
-  const btSoftBody& add(Real stiffness, Real height, Integrator integrator) {
+  const btSoftBody& add(Real stiffness, Real height, Integrator integrator, const Vector3& aside = {0, 0, 0}) {
     sim.set_gravity({0, -g, 0});
     const TetMesh torus = make_torus(0.7, 0.3, 2, 14);
     return sim.add_jelly(torus, {.stiffness = stiffness,
-                                 .shift = {0, height - torus.vertices.row(1).minCoeff(), 0},
+                                 .shift = aside + Vector3(0, height - torus.vertices.row(1).minCoeff(), 0),
                                  .attach = {.step = {.integrator = integrator}}});
   }
   const StepReport& report() { return sim.penalty().report(body); }
@@ -119,6 +119,34 @@ TEST_P(ImplicitContactTest, ASlabOfAnyMassComesToRestOnARingOfAnyStiffness) {
       for (const BodyContact& contact : fall.sim.penalty().contacts(fall.body)) carried += contact.impulse.y() / frame;
       EXPECT_NEAR(carried, fall.weight(), 0.01 * (fall.weight() + mass * g)) << "the ground's less the slab's";
     }
+}
+
+TEST_P(ImplicitContactTest, ARingOfAnyStiffnessComesToRestOnAnother) {
+  for (const Real stiffness : {1e3, 1e5}) {
+    SCOPED_TRACE(stiffness);
+    Fall fall(GetParam(), stiffness, 0.3, Integrator::implicit_step);
+    const btSoftBody& other = fall.add(stiffness, 1.2, Integrator::implicit_step, {0.3, 0, 0.1});
+    const Real start = fall.sim.totals().energy;
+    Real largest = start;
+    for (int k = 0; k < 180; ++k) {
+      fall.sim.step(frame);
+      for (const btSoftBody* body : {&fall.body, &other}) {
+        ASSERT_TRUE(fall.sim.penalty().report(*body).finite);
+        ASSERT_EQ(fall.sim.penalty().report(*body).integrator, Integrator::implicit_step) << "frame " << k;
+      }
+      largest = std::max(largest, fall.sim.totals().energy);
+    }
+    EXPECT_LE(largest, start * (1 + limit(1e-9, 1e-5)));
+    EXPECT_LT(fall.kinetic() + kinetic_energy(fall.sim.penalty().particles(other)), 1e-6 * start);
+    EXPECT_NEAR(lowest(fall.body), jelly_margin, 1e-3);
+    EXPECT_GT(lowest(other), 0.54) << "it lies on the other";
+    Real carried = 0, on_other = 0;
+    for (const BodyContact& contact : fall.sim.penalty().contacts(fall.body))
+      if (contact.object == &fall.ground) carried += contact.impulse.y() / frame;
+    for (const BodyContact& contact : fall.sim.penalty().contacts(other)) on_other += contact.impulse.y() / frame;
+    EXPECT_NEAR(carried, 2 * fall.weight(), 2e-3 * fall.weight());
+    EXPECT_NEAR(on_other, fall.weight(), 2e-3 * fall.weight());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(World, ImplicitContactTest, both_worlds(), param_name);

@@ -197,6 +197,7 @@ bool BackwardEuler::run() {
   if (!surfaces_ && !island_.surfaces.empty() && std::isfinite(newton_.value()) &&
       all_surfaces_.meet(newton_.positions() - guess(false))) {
     if (!all_surfaces_.may_be_near) return false;
+    all_surfaces_.are_near = true;
     surfaces_ = &all_surfaces_;
     return run();
   }

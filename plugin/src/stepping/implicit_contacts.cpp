@@ -89,6 +89,7 @@ ImplicitContacts::ImplicitContacts(Island& island, ImplicitContactScratch& scrat
     add(row, place.gap, std::numeric_limits<Real>::infinity(), contact.radius == 0);
     if (static_cast<int>(rows_.size()) > place_of_row) add_turning(contact, place_of_row);
   }
+  add_anchors();
   first_of_surfaces_ = rows_.size();
 }
 
@@ -147,14 +148,19 @@ bool ImplicitContacts::is_any_free(const ContactSides& sides) const {
                      [this](int i) { return inverse_masses_[i] > 0; });
 }
 
+// What a point does on its arc beyond the way that is linear in the turn.
+Vector3 ImplicitContacts::bend_of(const Vector3& turn, const Vector3& arm) {
+  const Real angle = turn.norm();
+  if (!(angle > 0)) return Vector3::Zero();
+  return Eigen::AngleAxis<Real>(angle, turn / angle) * arm - arm - turn.cross(arm);
+}
+
 // Of a point at `arm` from the centre of a body: of one that takes no impulse, by drifting; of another what is beyond the
 // linear part, as it turns now. `bends`: it goes on an arc, where velocities lead off it.
 Vector3 ImplicitContacts::way_of(const RigidBody& body, const Vector3& arm, bool bends) const {
   const Vector3 turn = duration_ * body.angular_velocity;
   Vector3 way = body.is_dynamic() ? Vector3::Zero() : Vector3(duration_ * body.velocity_at(arm));
-  if (const Real angle = turn.norm(); bends && angle > 0)
-    way += Eigen::AngleAxis<Real>(angle, turn / angle) * arm - arm - turn.cross(arm);
-  return way;
+  return bends ? Vector3(way + bend_of(turn, arm)) : way;
 }
 
 // Points that share particles, as those of an embedded surface do, share what these give way by.
@@ -173,6 +179,7 @@ void ImplicitContacts::set_hardness() {
       continue;
     }
     Real mobility = mobility_of(row.a, row.arm_a, row.normal) + mobility_of(row.b, row.arm_b, row.normal);
+    if (row.anchor && row.b->is_dynamic()) mobility = row.b->mobility_at(row.arm_b).trace() / 3;
     if (row.soft_a != row.soft_b)
       for (const int k : {row.soft_a, row.soft_b})
         if (k >= 0 && island_.bodies[k]->implicit.newton.fixed().empty()) mobility += 1 / island_.bodies[k]->mass;
@@ -257,23 +264,24 @@ ImplicitContacts::Change ImplicitContacts::limit_change(const PackedVectors& x) 
   Change change;
   for (const Row& row : rows_) {
     const Real limit = row.friction * std::max<Real>(pressing_of_limit(row), 0);
-    if (row.presser < 0) {
+    if (row.presser < 0 && !row.anchor) {
       change.limits += std::abs(limit - row.limit);
       change.sum += limit;
     }
-    const Vector3 way = moved(row, x);
-    if (force_of(row, way).pressing > 0) change.gap = std::max(change.gap, std::abs(gap_of(row, way)));
+    const Vector3 way = moved(row, x) + row.way - bent_way(row, x);
+    change.gap = std::max(change.gap, error_of(row, force_of(row, way), way));
   }
   return change;
 }
 
 void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settled_gap) {
   for (Row& row : rows_) {
+    row.way = bent_way(row, x);
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
-    row.limit = row.friction * std::max<Real>(pressing_of_limit(row), 0);
+    if (!row.anchor) row.limit = row.friction * std::max<Real>(pressing_of_limit(row), 0);
     if (!converged) continue;
-    const Real gap = given.pressing > 0 ? std::abs(gap_of(row, way)) : 0;
+    const Real gap = error_of(row, given, way);
     if (gap > settled_gap && gap > enough_less * row.last_gap) {
       row.hardness *= hardening;
       row.hardening *= hardening;
@@ -285,7 +293,10 @@ void ImplicitContacts::update(const PackedVectors& x, bool converged, Real settl
 }
 
 void ImplicitContacts::finish(const PackedVectors& x) {
-  for (SteppedBody* body : island_.bodies) body->implicit.contacts.clear();
+  for (SteppedBody* body : island_.bodies) {
+    body->implicit.contacts.clear();
+    body->implicit.anchors.clear();
+  }
   for (Row& row : rows_) {
     const Vector3 way = moved(row, x);
     const Force given = force_of(row, way);
@@ -307,6 +318,11 @@ void ImplicitContacts::finish(const PackedVectors& x) {
     if (row.b && row.b->is_dynamic()) row.b->give(-impulse, -row.arm_b.cross(impulse));
     if (row.rigid) continue;
     give_to_soft(row, given, way, x);
+    if (row.anchor) {
+      island_.bodies[row.soft_a]->implicit.anchors.push_back(
+          {row.anchor->a.point.particles, row.anchor->b.anchor, given.force});
+      continue;
+    }
     const Vector3 rubbed = given.force - given.pressing * row.normal;
     const bool slides = is_at_limit(rubbed.norm(), row.friction * given.pressing);
     ContactImpulse sum;
@@ -318,7 +334,8 @@ void ImplicitContacts::finish(const PackedVectors& x) {
       island_.surface_scratch->records.push_back({row.features, row.thickness, sum});
   }
   for (SteppedBody* body : island_.bodies)
-    std::ranges::sort(body->implicit.contacts, {}, &RememberedContact::particles);
+    for (std::vector<RememberedContact>* memory : {&body->implicit.contacts, &body->implicit.anchors})
+      std::ranges::sort(*memory, {}, &RememberedContact::particles);
   remember_features();
 }
 

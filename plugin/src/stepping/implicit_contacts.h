@@ -14,6 +14,7 @@ namespace penalty {
 struct ImplicitContactRow {
   Contact* contact = nullptr;            // of soft bodies; else
   RigidContact* rigid = nullptr;         // between rigid ones; else
+  const Anchor* anchor = nullptr;        // of a soft body at a rigid one; else
   TouchingFeatures features = {};        // of surfaces
   ContactMemory memory = {};             // of these, of the last step
   Real thickness = 0, kept = 0;          // distance that these keep, and that in this step [m]
@@ -61,14 +62,16 @@ struct ImplicitContactScratch {
 ///
 ///     g(x) = g0 + n . (J (x - x0) - u),   s(x) = (1 - n nᵀ) (J (x - x0) - u),
 ///
-/// J as in ContactSides, u the way in the step, there, of what takes no impulse. What resists turning has s alone. The normal n is that of where the step
-/// begins; that of two features of surfaces, and their closest points, are those of where they were `taken` last, which is
-/// done anew when the iterations have led far from there, or might lead through each other. The contact is pressed by
-/// f = max(0, l - rho g), and rubbed by -rho s, shortened to a limit that is held while Newton's method iterates: an energy
-/// with a continuous derivative, convex. The limit is what the linear model of the last iteration presses, times the
-/// coefficient of friction; its stiffness at the limit is a secant, which is never less than the energy's. The multipliers
-/// l, of which the friction has its own, begin with what the contact gave in the last step, and end as what it gives in
-/// this one: what lies neither sinks nor creeps.
+/// J as in ContactSides, u the way in the step, there, of what takes no impulse. What resists turning has s alone. The normal n
+/// is that of where the step begins; that of two features of surfaces, and their closest points, are those of where they were
+/// `taken` last, which is done anew when the iterations have led far from there, or might lead through each other. The contact
+/// is pressed by f = max(0, l - rho g), and rubbed by -rho s, shortened to a limit that is held while Newton's method
+/// iterates: an energy with a continuous derivative, convex. The limit is what the linear model of the last iteration presses,
+/// times the coefficient of friction; its stiffness at the limit is a secant, which is never less than the energy's. The
+/// multipliers l, of which the friction has its own, begin with what the contact gave in the last step, and end as what it
+/// gives in this one: what lies neither sinks nor creeps.
+///
+/// An anchor is the same without a normal, nor a limit of what would be friction: it holds in all directions.
 ///
 /// rho is `hardness` times the inertia and stiffness that the contact works against, of the particles and of each body as
 /// a whole: more would be met by no motion of the bodies.
@@ -139,6 +142,9 @@ class ImplicitContacts {
   void add(Row row, Real gap, Real deepest, bool bends);
   void start(Row& row, const Vector3& force);
   void add_turning(const RigidContact& contact, int presser);
+  void add_anchors();
+  Vector3 bent_way(const Row& row, const PackedVectors& x) const;
+  static Vector3 bend_of(const Vector3& turn, const Vector3& arm);
   Real pressing_of_limit(const Row& row) const { return (row.presser < 0 ? row : rows_[row.presser]).linear_pressing; }
   void predict(Row& row) const;
   void add(const SurfaceContact& contact, FeaturePair& q, Real reach, const PackedVectors& x);
@@ -155,6 +161,11 @@ class ImplicitContacts {
   Vector3 moved(const Row& row, const PackedVectors& x) const { return row.sides.distance(x) - row.start - row.way; }
   Force force_of(const Row& row, const Vector3& moved) const;
   static Real gap_of(const Row& row, const Vector3& moved) { return row.gap + row.normal.dot(moved); }
+  /// What is still wrong where it presses or holds [m].
+  static Real error_of(const Row& row, const Force& given, const Vector3& moved) {
+    if (row.anchor) return moved.norm();
+    return given.pressing > 0 ? std::abs(gap_of(row, moved)) : 0;
+  }
 
   ImplicitContacts(Island& island, ImplicitContactScratch& scratch, const PackedVectors& from,
                    ImplicitSurfaces* surfaces, Real duration);

@@ -43,6 +43,7 @@ bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duratio
     energy_noise += body->energy_noise;
     energy_tolerance = std::min(energy_tolerance, body->options.energy_tolerance);
     body->implicit.contacts_at_start = body->implicit.contacts;
+    body->implicit.anchors_at_start = body->implicit.anchors;
     body->report.integrator = Integrator::implicit_step;
   }
   RigidContacts rigid_contacts(island);
@@ -58,6 +59,7 @@ bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duratio
       undo_step(*body);
       body->implicit.newton.forget_stiffness();
       body->implicit.contacts = body->implicit.contacts_at_start;
+      body->implicit.anchors = body->implicit.anchors_at_start;
     }
     surfaces.undo();
   };
@@ -103,7 +105,7 @@ bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duratio
   }
   report_particle_contacts(island);
   if (island.surface_scratch) island.surface_scratch->num_touching = 0;
-  surfaces.report();
+  if (surfaces.are_near) surfaces.report();
   find_records(island);
   for (SteppedBody* body : island.bodies) {
     body->report.substeps = step.attempt.substeps;

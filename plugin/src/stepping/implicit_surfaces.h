@@ -14,7 +14,7 @@ class ImplicitSurfaces {
  public:
   explicit ImplicitSurfaces(Island& island) : island_(island), surfaces_(island) {}
 
-  bool are_near = false;     // they may touch, as bodies move now
+  bool are_near = false;     // they may touch, as bodies move now, or as was found in the step
   bool may_be_near = false;  // if not, but by what acts on these, their contacts may be taken implicitly
 
   /// Whether their contacts can be taken implicitly, in a step of `duration` [s]: nothing has to be led out of anything, what

@@ -60,7 +60,9 @@ bool may_bounce(const RigidContact& contact, const Island& island) {
 }
 
 bool may_step_implicitly(const Island& island) {
-  if (!island.couplings.empty() || !island.anchors.empty() || !island.joints.empty()) return false;
+  if (!island.couplings.empty() || !island.joints.empty()) return false;
+  for (const Anchor& anchor : island.anchors)
+    if (anchor.influence < 1) return false;
   for (const RigidBody& rigid : island.rigid_bodies)
     if (rigid.is_dynamic() && !rigid.is_free()) return false;
   return std::ranges::none_of(island.rigid_contacts,

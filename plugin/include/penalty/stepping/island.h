@@ -35,6 +35,7 @@ struct RememberedContact {
 struct ImplicitState {
   NewtonBody newton;
   std::vector<RememberedContact> contacts, contacts_at_start;  // sorted by particles
+  std::vector<RememberedContact> anchors, anchors_at_start;    // likewise; normal: the point in the rigid body
   PackedVectors acceleration;                                  // mean one of the last step [m/s²]
   bool has_acceleration = false;
 
