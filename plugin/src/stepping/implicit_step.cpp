@@ -99,7 +99,8 @@ bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duratio
   };
   const GuardedStep step =
       guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2}, attempt, undo);
-  if (!step.finite && !is_separated) {
+  const bool gains = step.attempt.energy - step.attempt.allowed > step.attempt.noise;
+  if (step.finite ? gains : !is_separated) {
     undo();
     return false;
   }

@@ -6,7 +6,8 @@ namespace penalty {
 
 class ImplicitSurfaces;
 
-/// Of an island of soft bodies and of rigid ones. Returns false, with all where it was, if surfaces cannot be kept apart so.
+/// Of an island of soft bodies and of rigid ones. Returns false, with all where it was, if surfaces cannot be kept apart so, or
+/// energy would grow.
 bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duration);
 
 }  // namespace penalty
