@@ -99,7 +99,8 @@ bool advance_implicitly(Island& island, ImplicitSurfaces& surfaces, Real duratio
   };
   const GuardedStep step =
       guard_energy(1, start_energy, {.most_substeps = most_implicit_substeps, .factor = 2}, attempt, undo);
-  const bool gains = step.attempt.energy - step.attempt.allowed > step.attempt.noise;
+  const Real most_energy = std::max(start_energy, step.attempt.energy) + start_rigid_energy;
+  const bool gains = step.attempt.energy - step.attempt.allowed > energy_tolerance * most_energy + energy_noise;
   if (step.finite ? gains : !is_separated) {
     undo();
     return false;
