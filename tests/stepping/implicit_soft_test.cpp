@@ -11,42 +11,18 @@ bool is_implicit(SurfaceBodies& bodies, std::size_t k = 0) {
   return bodies[k].body.report.integrator == Integrator::implicit_step;
 }
 
-// Balls that hit each other off the centre, without gravity.
-class ImplicitHit : public ::testing::TestWithParam<Real> {};
-
-TEST_P(ImplicitHit, KeepsBothMomentaAndCrossesNothing) {
-  const TetMesh ball = make_ball(0.5, 2);
-  for (const Real speed : {0.5, 5.0, 50.0}) {
-    SCOPED_TRACE(speed);
-    SurfaceBodies bodies;
-    bodies.integrator = Integrator::implicit_step;
-    bodies.friction = GetParam();
-    bodies.damping_time = 0.002;
-    bodies.add(ball, 10, 1, {.shift = {-0.55, 0, 0}, .velocity = {speed / 2, 0, 0}});
-    const Matrix3 turned = Eigen::AngleAxis<Real>(1, Vector3(1, 2, 3).normalized()).toRotationMatrix();
-    bodies.add(ball, 10, 3, {.shift = {0.55, 0.3, 0.2}, .velocity = {-speed / 2, 0, 0}, .rotation = turned});
-    const Momentum start = bodies.momentum();
-    const Real energy = bodies.energy();
-    Real last = energy, gain = 0;
-    for (int k = 0; k < (speed < 1 ? 60 : 20); ++k) {
-      bodies.step();
-      ASSERT_TRUE(is_implicit(bodies, 0) && is_implicit(bodies, 1));
-      ASSERT_EQ(bodies.crossings(), 0) << "frame " << k;
-      gain = std::max(gain, bodies.energy() - last);
-      last = bodies.energy();
-    }
-    const Momentum end = bodies.momentum();
-    EXPECT_LT((end.linear - start.linear).norm(), 1e-13 * speed);
-    EXPECT_LT((end.angular - start.angular).norm(), 1e-13 * speed);
-    EXPECT_LE(gain, 1e-12 * energy);
-    EXPECT_LT(last, 0.9 * energy) << "did not hit";
-  }
+// Bodies that are to lie on the floor, or on each other.
+SurfaceBodies on_the_floor() {
+  SurfaceBodies bodies;
+  bodies.integrator = Integrator::implicit_step;
+  bodies.friction = 0.5;
+  bodies.gravity = {0, -g, 0};
+  bodies.floors = {0};
+  return bodies;
 }
 
-INSTANTIATE_TEST_SUITE_P(Friction, ImplicitHit, ::testing::Values(0, 0.5, 1));
-
 TEST(ImplicitSoft, ACentralHitIsPerfectlyPlastic) {
-  // By contacts of particles with particles; 1 kg at 3 m/s on 2 kg at rest.
+  // By contacts of particles with particles; 1 kg at 3 m/s on 2 kg at rest. What is slower than 1e-4 m/s counts as settled.
   Body left = make_free_particles(Eigen::Matrix3Xd(Vector3(-0.02, 0, 0)), {1});
   Body right = make_free_particles(Eigen::Matrix3Xd(Vector3(0, 0, 0)), {2});
   left.set_velocity(0, {3, 0, 0});
@@ -65,11 +41,7 @@ TEST(ImplicitSoft, ACentralHitIsPerfectlyPlastic) {
 TEST(ImplicitSoft, StackedBoxesStandStillOnEachOther) {
   for (const Real stiffness : {1e2, 1e4, 1e6}) {
     SCOPED_TRACE(stiffness);
-    SurfaceBodies bodies;
-    bodies.integrator = Integrator::implicit_step;
-    bodies.friction = 0.5;
-    bodies.gravity = {0, -g, 0};
-    bodies.floors = {0};
+    SurfaceBodies bodies = on_the_floor();
     const TetMesh box = make_box({1, 1, 1}, {3, 3, 3});
     for (int k = 0; k < 3; ++k) bodies.add(box, stiffness, 10, {.shift = {0, 0.02 + 1.03 * k, 0}});
     const Real start = bodies.energy();
@@ -93,11 +65,7 @@ TEST(ImplicitSoft, TheHeavyDoesNotCrushTheLight) {
   // 100 kg, as stiff for its weight, on 1 kg: what is below is a hundredth of the elastic energy per displacement.
   for (const Real stiffness : {1e4, 1e6}) {
     SCOPED_TRACE(stiffness);
-    SurfaceBodies bodies;
-    bodies.integrator = Integrator::implicit_step;
-    bodies.friction = 0.5;
-    bodies.gravity = {0, -g, 0};
-    bodies.floors = {0};
+    SurfaceBodies bodies = on_the_floor();
     const TetMesh box = make_box({1, 1, 1}, {3, 3, 3});
     bodies.add(box, stiffness, 1, {.shift = {0, 0.02, 0}});
     bodies.add(box, 100 * stiffness, 100, {.shift = {0.05, 1.1, 0.03}});
@@ -113,11 +81,7 @@ TEST(ImplicitSoft, TheHeavyDoesNotCrushTheLight) {
 
 TEST(ImplicitSoft, WhatCrushesTheLightGainsNoEnergy) {
   // Ten tonnes on 1 kg that can store a thousandth of their fall: what no implicit step can do without gain is left to substeps.
-  SurfaceBodies bodies;
-  bodies.integrator = Integrator::implicit_step;
-  bodies.friction = 0.5;
-  bodies.gravity = {0, -g, 0};
-  bodies.floors = {0};
+  SurfaceBodies bodies = on_the_floor();
   const TetMesh box = make_box({1, 1, 1}, {3, 3, 3});
   bodies.add(box, 1e2, 1, {.shift = {0, 0.02, 0}});
   bodies.add(box, 1e6, 1e4, {.shift = {0.05, 1.1, 0.03}});
@@ -133,12 +97,8 @@ TEST(ImplicitSoft, WhatFallsFromRestIsMetInTheFirstStep) {
   // So small that gravity alone takes it through all that is below in one step: velocities say nothing of that.
   for (const Real size : {1e-3, 1e-2}) {
     SCOPED_TRACE(size);
-    SurfaceBodies bodies;
-    bodies.integrator = Integrator::implicit_step;
-    bodies.friction = 0.5;
+    SurfaceBodies bodies = on_the_floor();
     bodies.margin = 0.02 * size;
-    bodies.gravity = {0, -g, 0};
-    bodies.floors = {0};
     const TetMesh box = make_box({size, size, size}, {3, 3, 3});
     const Real mass = 1000 * size * size * size, stiffness = 100 * mass * g * size;
     bodies.add(box, stiffness, mass, {.shift = {0, 0.02 * size, 0}});

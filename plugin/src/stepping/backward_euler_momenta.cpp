@@ -55,14 +55,16 @@ void BackwardEuler::restore_momenta(std::size_t k, const RigidState& before, con
 }
 
 void BackwardEuler::cap_energy(Real allowed) {
-  Real excess = -allowed, at_hand = 0;  // the energies of what may be taken
-  for (const SteppedBody* body : island_.bodies) {
-    const Real kinetic = kinetic_energy(body->particles);
-    excess += body->elastic_energy + kinetic;
-    at_hand += kinetic - (is_free(*body) ? RigidState(body->particles).kinetic_energy() : 0);
+  Real excess = -allowed;
+  for (SteppedBody* body : island_.bodies) {
+    body->report.capped_energy = 0;
+    excess += body->elastic_energy + kinetic_energy(body->particles);
   }
-  for (SteppedBody* body : island_.bodies) body->report.capped_energy = 0;
-  if (!(excess > 0) || !(at_hand > 0)) return;
+  if (!(excess > 0)) return;
+  Real at_hand = 0;  // what may be taken
+  for (const SteppedBody* body : island_.bodies)
+    at_hand += kinetic_energy(body->particles) - (is_free(*body) ? RigidState(body->particles).kinetic_energy() : 0);
+  if (!(at_hand > 0)) return;
   const Real share = std::sqrt(std::max<Real>(0, 1 - excess / at_hand));
   for (SteppedBody* body : island_.bodies) {
     Particles& particles = body->particles;

@@ -89,6 +89,7 @@ NewtonSolver::OfBody NewtonSolver::evaluate(const NewtonBody& body, Eigen::Index
   if (body.damped_from.size() != 0) {
     auto displacement = displacement_.middleCols(first, count), force = damping_force_.middleCols(first, count);
     displacement = x - body.damped_from;
+    force.setZero();
     body.damping_.add_product(displacement, 1, force);
     sum.damping = displacement.cwiseProduct(force).sum() / 2;
     gradient += force;
@@ -100,7 +101,7 @@ NewtonSolver::OfBody NewtonSolver::evaluate(const NewtonBody& body, Eigen::Index
 
 void NewtonSolver::evaluate(State& state) {
   const Eigen::Index num_particles = displacement_.cols();
-  for (PackedVectors* v : {&state.forces, &damping_force_}) v->setZero(4, num_particles);
+  state.forces.setZero(4, num_particles);
   state.gradient.resize(4, state.positions.cols());
   state.bodies.resize(objective.bodies.size());
   state.value = state.magnitude = 0;
@@ -134,7 +135,7 @@ void NewtonSolver::prepare() {
     body->field_->add_damping(body->damped_from, body->damping_time, body->damping_);
     body->damping_.scale(objective.inverse_duration);
   }
-  displacement_.resize(4, system_.num_particles());
+  for (PackedVectors* v : {&displacement_, &damping_force_}) v->resize(4, system_.num_particles());
 }
 
 void NewtonSolver::start(const PackedVectors& x) {
