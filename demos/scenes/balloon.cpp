@@ -11,7 +11,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace balloon {
 
 constexpr Real radius = 0.4, clearance = 0.3;  // of the nozzle above the ground [m]
 constexpr Fabric rubber{{.young = 4e4, .poisson = poisson_of_springs, .density = 1000}, {.thickness = 5e-4}};
@@ -50,7 +50,7 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, Real re
           {"pressure_of_skin", skin_pressure(rest_area, rest, volume)}};
 }
 
-BodyMesh balloon_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "balloon");
   refuse_model(options, "balloon");
   TriangleSurface sphere = make_sphere(radius, cells_in(options, 28, 4, 200) / 2);  // of an icosahedron's edge
@@ -58,7 +58,7 @@ BodyMesh balloon_body(const SceneOptions& options) {
   return {std::move(sphere)};
 }
 
-SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   if (options.poisson || options.young || options.stiffness)
     throw std::invalid_argument("scene balloon has a skin of its own: --young, --poisson and --stiffness do not apply");
   PotentialField field = rubber.field_of(body.shell());
@@ -89,9 +89,9 @@ SceneSetup balloon(const SceneOptions& options, const BodyMesh& body) {
       }};
 }
 
-}  // namespace
+}  // namespace balloon
 
 const SceneEntry balloon_scene{"balloon", "a balloon is blown up until it encloses two and a half times its volume", 4,
-                               balloon_body, balloon};
+                               balloon::body, balloon::setup};
 
 }  // namespace penalty::demo

@@ -7,7 +7,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace beam {
 
 constexpr Real young = 1e7, density = 1000, drag = 0.1;
 
@@ -27,7 +27,7 @@ PotentialField reference_field(const TetMesh& mesh, Real cell) {
   return field;
 }
 
-BodyMesh beam_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "beam");
   const int cells = options.cells.value_or(32);
   if (cells < 4 || cells > 200 || cells % 4 != 0)
@@ -36,7 +36,7 @@ BodyMesh beam_body(const SceneOptions& options) {
   return {make_beam(cells / 4)};
 }
 
-SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   const bool reference = !options.stiffness && !options.young && !options.poisson && !options.model;
   const Real cell = 4.0 / options.cells.value_or(32);
@@ -66,9 +66,9 @@ SceneSetup beam(const SceneOptions& options, const BodyMesh& body) {
           .look = {.azimuth = 24, .elevation = 12, .still_time = 0.5}};  // when it hangs deepest
 }
 
-}  // namespace
+}  // namespace beam
 
-const SceneEntry beam_scene{"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2, beam_body,
-                            beam};
+const SceneEntry beam_scene{"beam", "a beam of 4 x 1 x 1 m, held at one end, bends under its weight", 2, beam::body,
+                            beam::setup};
 
 }  // namespace penalty::demo

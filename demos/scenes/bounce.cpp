@@ -7,7 +7,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace bounce {
 
 constexpr Material rubber{.young = 3e6, .poisson = 0.4, .density = 1000};
 constexpr Real damping = 0.008;                    // [s]
@@ -30,9 +30,9 @@ struct Bounce {
   Real share() const { return down > 0 ? up / down : 0; }
 };
 
-BodyMesh bounce_body(const SceneOptions& options) { return load_body(options, "ball"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "ball"); }
 
-SceneSetup bounce(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Real lowest = body.drawn(body.vertices()).row(1).minCoeff();
   SceneSetup setup{.name = "bounce",
                    .title = "Restitution 0, 0.5 and 0.9",
@@ -57,9 +57,9 @@ SceneSetup bounce(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace bounce
 
 const SceneEntry bounce_scene{"bounce", "three rubber balls bounce, of which only the restitution differs", 2.5,
-                              bounce_body, bounce};
+                              bounce::body, bounce::setup};
 
 }  // namespace penalty::demo

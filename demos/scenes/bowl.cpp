@@ -7,7 +7,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace bowl {
 
 constexpr Material jelly{.young = 8e5, .poisson = 0.35, .density = 300};
 constexpr Real damping = 0.04;                            // [s]
@@ -23,7 +23,7 @@ BodyMesh mesh_of(SceneOptions options, const std::string& name, int cells) {
   return load_body(options, name);
 }
 
-BodyMesh bowl_body(const SceneOptions& options) { return mesh_of(options, "torus", 18); }
+BodyMesh body(const SceneOptions& options) { return mesh_of(options, "torus", 18); }
 
 /// Blocks around the floor that lean outwards.
 std::vector<RigidObject> walls() {
@@ -68,7 +68,7 @@ int escaped(const SceneState& state) {
   return count;
 }
 
-SceneSetup bowl(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   std::vector<BodyMesh> kinds{body};
   if (options.mesh.empty()) {
     kinds.push_back(mesh_of(options, "ball", 10));
@@ -109,9 +109,9 @@ SceneSetup bowl(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace bowl
 
 const SceneEntry bowl_scene{"bowl", "soft rings, balls and boxes fall into a bowl, with rigid balls among them", 6,
-                            bowl_body, bowl};
+                            bowl::body, bowl::setup};
 
 }  // namespace penalty::demo

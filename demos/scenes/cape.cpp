@@ -9,7 +9,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace cape {
 
 constexpr Real width = 0.5, length = 0.9;  // [m]
 constexpr Fabric woven{{.young = 6e5, .poisson = poisson_of_springs, .density = 300},
@@ -20,7 +20,7 @@ constexpr Real height = 0.74, behind = 0.04;                          // of its 
 constexpr Real speed = 5, radius = 2;                                 // [m/s], [m]
 constexpr Real starts = 0.4, runs = 1.2, brakes = 2.9, stands = 3.5;  // when [s]
 
-BodyMesh cape_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "cape");
   refuse_model(options, "cape");
   const int cells = cells_in(options, 14, 2, 100);
@@ -63,7 +63,7 @@ class Stretch {
   Real longest_ = 0, furthest_ = 0;
 };
 
-SceneSetup cape(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   SceneCloth sheet = cloth_of(options, body, woven);
 
@@ -94,8 +94,9 @@ SceneSetup cape(const SceneOptions& options, const BodyMesh& body) {
           .facts = [stretch](const SceneState&) { return stretch->facts(); }};
 }
 
-}  // namespace
+}  // namespace cape
 
-const SceneEntry cape_scene{"cape", "a cape, pinned at the shoulders of who runs and stops", 4.2, cape_body, cape};
+const SceneEntry cape_scene{"cape", "a cape, pinned at the shoulders of who runs and stops", 4.2, cape::body,
+                            cape::setup};
 
 }  // namespace penalty::demo

@@ -8,7 +8,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace cloth {
 
 constexpr Real size = 2, height = 1;  // [m]
 constexpr Fabric canvas{{.young = 8e5, .poisson = poisson_of_springs, .density = 300}, {.thickness = 1e-3}};
@@ -17,7 +17,7 @@ constexpr int pleats = 8;                                         // of the star
 constexpr Real damping = 0.01;                                    // [s]
 constexpr Real ball_radius = 0.25, ball_mass = 1.5, fall = 0.55;  // [m], [kg], [m]
 
-BodyMesh cloth_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "cloth");
   refuse_model(options, "cloth");
   const int cells = cells_in(options, 48, 2, 400);
@@ -29,7 +29,7 @@ BodyMesh cloth_body(const SceneOptions& options) {
   return {std::move(sheet)};
 }
 
-SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   const auto num_vertices = static_cast<int>(rest.cols());
   SceneCloth sheet = cloth_of(options, body, canvas);
@@ -69,8 +69,8 @@ SceneSetup cloth(const SceneOptions& options, const BodyMesh& body) {
           }};
 }
 
-}  // namespace
+}  // namespace cloth
 
-const SceneEntry cloth_scene{"cloth", "a sheet, held at its corners, catches a ball", 4, cloth_body, cloth};
+const SceneEntry cloth_scene{"cloth", "a sheet, held at its corners, catches a ball", 4, cloth::body, cloth::setup};
 
 }  // namespace penalty::demo

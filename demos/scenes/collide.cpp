@@ -6,7 +6,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace collide {
 
 constexpr Material jelly{.young = 4e5, .poisson = 0.35, .density = 1000};
 constexpr Real damping = 0.002;               // [s]
@@ -14,9 +14,9 @@ constexpr Real speed = 1.5;                   // of each [m/s]
 constexpr Real distance = 1.5, offset = 0.4;  // of each middle from the plane of the hit; of both across [m]
 constexpr Real reach = 0.05;                  // of what is measured between them [m]
 
-BodyMesh collide_body(const SceneOptions& options) { return load_body(options, "torus"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "torus"); }
 
-SceneSetup collide(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   SceneSetup setup{.name = "collide",
                    .title = "Two rings collide",
                    .step = step_options(options, {.damping_time = damping}),
@@ -41,9 +41,9 @@ SceneSetup collide(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace collide
 
 const SceneEntry collide_scene{"collide", "two soft rings hit each other in free space, off their middles", 2,
-                               collide_body, collide};
+                               collide::body, collide::setup};
 
 }  // namespace penalty::demo

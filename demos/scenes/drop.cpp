@@ -9,7 +9,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace drop {
 
 constexpr Real height = 2;  // of the lowest point [m]
 constexpr Material jelly{.young = 4e5, .poisson = 0.4, .density = 1000};
@@ -42,9 +42,9 @@ std::vector<RigidObject> scattered(int count, Real density, std::uint32_t seed) 
   return balls;
 }
 
-BodyMesh drop_body(const SceneOptions& options) { return load_body(options, "bunny"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "bunny"); }
 
-SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const int count = options.spheres.value_or(num_balls);
   if (count < 0 || count > 1000)
     throw std::invalid_argument("--spheres is " + std::to_string(count) + ", must be 0 to 1000");
@@ -72,9 +72,9 @@ SceneSetup drop(const SceneOptions& options, const BodyMesh& body) {
   return falling(std::move(elastic.field), elastic.mass, density, {.damping_time = jelly_damping});
 }
 
-}  // namespace
+}  // namespace drop
 
 const SceneEntry drop_scene{"drop", "a mesh, by default the Stanford bunny, falls on the ground among rigid balls", 3,
-                            drop_body, drop};
+                            drop::body, drop::setup};
 
 }  // namespace penalty::demo

@@ -3,16 +3,16 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace flight {
 
 constexpr Real stiffness = 0.1;      // of every constraint [J]
 constexpr Real stretch = 1.2;        // along x
 constexpr Real safety = 0.4;         // small substeps: the energy then swings by less than it is plotted with
 constexpr Real hard_damping = 0.01;  // of a start far from rest, which otherwise would never find back [s]
 
-BodyMesh flight_body(const SceneOptions& options) { return load_body(options, "torus"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "torus"); }
 
-SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   SceneOptions chosen = options;
   if (!options.stiffness && !options.young && !options.poisson && !options.model) chosen.stiffness = stiffness;
   Elasticity elastic = elasticity(chosen, body.solid(), {});
@@ -36,8 +36,8 @@ SceneSetup flight(const SceneOptions& options, const BodyMesh& body) {
           .look = {.azimuth = 20, .elevation = 32}};
 }
 
-}  // namespace
+}  // namespace flight
 
-const SceneEntry flight_scene{"flight", "a stretched, spinning body flies freely", 10, flight_body, flight};
+const SceneEntry flight_scene{"flight", "a stretched, spinning body flies freely", 10, flight::body, flight::setup};
 
 }  // namespace penalty::demo

@@ -10,7 +10,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace fold {
 
 constexpr Real width = 1, length = 1.4;  // [m]
 constexpr Fabric woven{{.young = 2e5, .poisson = poisson_of_springs, .density = 300},
@@ -20,7 +20,7 @@ constexpr Real ball_radius = 0.2, clearance = 0.12;  // between ball and cloth [
 constexpr Real fold_radius = 0.04, wave = 0.02;      // of the fold at the top, of the waves of both layers [m]
 constexpr Real kept_share = 0.3, margin = 0.02;      // of the mean edge, at most: what layers keep [m]
 
-BodyMesh fold_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "fold");
   refuse_model(options, "fold");
   const int cells = cells_in(options, 38, 4, 200);
@@ -41,7 +41,7 @@ Eigen::Matrix3Xd folded_over(const Eigen::Matrix3Xd& flat) {
   return x;
 }
 
-SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   SceneCloth sheet = cloth_of(options, body, woven);
   const Start start = options.start.value_or(Start::rest);
@@ -70,8 +70,8 @@ SceneSetup fold(const SceneOptions& options, const BodyMesh& body) {
           }};
 }
 
-}  // namespace
+}  // namespace fold
 
-const SceneEntry fold_scene{"fold", "a cloth falls folded on a ball and lies on itself", 3, fold_body, fold};
+const SceneEntry fold_scene{"fold", "a cloth falls folded on a ball and lies on itself", 3, fold::body, fold::setup};
 
 }  // namespace penalty::demo

@@ -5,7 +5,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace hand {
 
 constexpr Material foam{.young = 1e5, .poisson = 0.35, .density = 200};
 constexpr Real damping = 0.02;  // [s]
@@ -73,9 +73,9 @@ class Grip {
   Real height_ = 0;
 };
 
-BodyMesh hand_body(const SceneOptions& options) { return load_body(options, "ball"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "ball"); }
 
-SceneSetup hand(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd drawn = body.drawn(body.vertices());
   const Real radius = drawn.row(0).maxCoeff();
   SceneSetup setup{.name = "hand",
@@ -98,8 +98,9 @@ SceneSetup hand(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace hand
 
-const SceneEntry hand_scene{"hand", "fingers close around a soft ball, lift it and hold it", 4.5, hand_body, hand};
+const SceneEntry hand_scene{"hand", "fingers close around a soft ball, lift it and hold it", 4.5, hand::body,
+                            hand::setup};
 
 }  // namespace penalty::demo

@@ -7,7 +7,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace incline {
 
 constexpr Material jelly{.young = 4e5, .poisson = 0.35, .density = 1000};
 constexpr Real damping = 0.02;                                           // [s]
@@ -39,9 +39,9 @@ struct Way {
   }
 };
 
-BodyMesh incline_body(const SceneOptions& options) { return load_body(options, "torus"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "torus"); }
 
-SceneSetup incline(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Real lowest = body.drawn(body.vertices()).row(1).minCoeff();
   const Vector3 middle(0, half_length * std::sin(angle * std::numbers::pi / 180) + 0.3, 0);
   SceneSetup setup{.name = "incline",
@@ -73,9 +73,9 @@ SceneSetup incline(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace incline
 
 const SceneEntry incline_scene{"incline", "of two soft rings on a slope the rough one stays and the smooth one slides",
-                               2.6, incline_body, incline};
+                               2.6, incline::body, incline::setup};
 
 }  // namespace penalty::demo

@@ -5,13 +5,13 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace materials {
 
 constexpr Real length = 2, thickness = 0.2, width = 0.5, apart = 0.4;  // [m]
 constexpr Material rubber{.young = 1e7, .poisson = 0.4, .density = 1000};
 constexpr Material hard{.young = 15e7, .poisson = 0.4, .density = 1000};
 
-BodyMesh board(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "materials");
   refuse_model(options, "materials");
   const int cells = cells_in(options, 32, 8, 200);  // along the board
@@ -30,7 +30,7 @@ BodyMesh board(const SceneOptions& options) {
   return {mesh};
 }
 
-SceneSetup materials(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const TetMesh& mesh = body.solid();
   const auto add = [&](SceneSetup& setup, const Material& wall, const Material& free, Real z) {
     const Materials both = materials_of(mesh, {{"next to the wall", wall}, {"free half", free}});
@@ -58,9 +58,10 @@ SceneSetup materials(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace materials
 
-const SceneEntry materials_scene{
-    "materials", "two boards, each half of rubber and half of something harder, held at one end", 3, board, materials};
+const SceneEntry materials_scene{"materials",
+                                 "two boards, each half of rubber and half of something harder, held at one end", 3,
+                                 materials::body, materials::setup};
 
 }  // namespace penalty::demo

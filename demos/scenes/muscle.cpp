@@ -9,7 +9,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace muscle {
 
 constexpr Real length = 2, width = 0.3, height = 0.18;  // [m]
 constexpr Real clearance = 0.02;                        // the margin of contact: it lies on the ground from the start
@@ -29,7 +29,7 @@ Real wanted_strain(Real x, Real time) {
   return -contraction * onset * (1 + wave) / 2;
 }
 
-BodyMesh muscle_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "muscle");
   const int cells = cells_in(options, 28, 8, 100), across = std::max(2, cells / 7);
   TetMesh bar = make_box({length, height, width}, {cells, across, across});
@@ -37,7 +37,7 @@ BodyMesh muscle_body(const SceneOptions& options) {
   return {std::move(bar)};
 }
 
-SceneSetup muscle(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   Elasticity elastic = elasticity(options, body.solid(), flesh);
 
@@ -81,9 +81,9 @@ SceneSetup muscle(const SceneOptions& options, const BodyMesh& body) {
           }};
 }
 
-}  // namespace
+}  // namespace muscle
 
 const SceneEntry muscle_scene{"muscle", "a worm wakes up and crawls: its fibres contract one after another", 12,
-                              muscle_body, muscle};
+                              muscle::body, muscle::setup};
 
 }  // namespace penalty::demo

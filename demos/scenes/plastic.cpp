@@ -8,7 +8,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace plastic {
 
 constexpr Real width = 0.8, height = 0.3, clearance = 0.02;  // of the block, of its bottom above the ground [m]
 constexpr Material metal{.young = 2e6, .poisson = 0.3, .density = 2000};
@@ -72,7 +72,7 @@ std::vector<Fact> facts(const Positions& x, const PotentialField& field, const Y
           {"yield_law_error", error}};
 }
 
-BodyMesh plastic_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "plastic");
   refuse_model(options, "plastic");
   if (options.phases.value_or(1) != 1)
@@ -83,7 +83,7 @@ BodyMesh plastic_body(const SceneOptions& options) {
   return {std::move(block)};
 }
 
-SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   if (options.start.value_or(Start::rest) != Start::rest)
     throw std::invalid_argument("scene plastic starts at rest: from elsewhere it would flow at once");
   Elasticity elastic = elasticity(options, body.solid(), metal);
@@ -106,9 +106,9 @@ SceneSetup plastic(const SceneOptions& options, const BodyMesh& body) {
           .facts = [law](const SceneState& state) { return facts(state.x(), state.field(), *law); }};
 }
 
-}  // namespace
+}  // namespace plastic
 
 const SceneEntry plastic_scene{"plastic", "a ball is pressed into a block of metal and withdrawn: the dent stays", 2.5,
-                               plastic_body, plastic};
+                               plastic::body, plastic::setup};
 
 }  // namespace penalty::demo

@@ -10,7 +10,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace potential_field {
 
 constexpr Real degree = std::numbers::pi / 180;
 const render::Color dark{0.16f, 0.18f, 0.22f}, grey{0.55f, 0.57f, 0.60f}, force_color{0.86f, 0.22f, 0.16f};
@@ -193,7 +193,7 @@ Figure volume_forces() {
   return figure;
 }
 
-std::vector<Figure> potential_field(const SceneOptions& options) {
+std::vector<Figure> setup(const SceneOptions& options) {
   refuse_mesh(options, "potential_field");
   std::vector<Figure> figures;
   figures.push_back(shells(cells_in(options, 72, 8, 200)));
@@ -201,13 +201,13 @@ std::vector<Figure> potential_field(const SceneOptions& options) {
   return figures;
 }
 
-}  // namespace
+}  // namespace potential_field
 
 const SceneEntry potential_field_scene{"potential_field",
                                        "a figure: equipotential surfaces of one particle, and the forces of a volume",
                                        6,
                                        nullptr,
                                        nullptr,
-                                       potential_field};
+                                       potential_field::setup};
 
 }  // namespace penalty::demo

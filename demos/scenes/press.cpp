@@ -6,7 +6,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace press {
 
 constexpr Material jelly{.young = 2e5, .poisson = 0.35, .density = 1000};
 constexpr Real damping = 0.01;                          // [s]
@@ -30,9 +30,9 @@ struct Squeeze {
   }
 };
 
-BodyMesh press_body(const SceneOptions& options) { return load_body(options, "torus"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "torus"); }
 
-SceneSetup press(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::RowVectorXd y = body.drawn(body.vertices()).row(1);
   const Real height = y.maxCoeff() - y.minCoeff(), top = height + margin;
   const auto slab = [top, height](Real time) {
@@ -57,9 +57,9 @@ SceneSetup press(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace press
 
 const SceneEntry press_scene{"press", "a slab presses a soft ring flat and is lifted: the ring has its shape again", 5,
-                             press_body, press};
+                             press::body, press::setup};
 
 }  // namespace penalty::demo

@@ -7,7 +7,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace recover {
 
 const Material jelly{.young = 1e6, .poisson = 0.35, .density = 1000};  // of two phases
 constexpr Real damping = 0.005;                                        // ratio to stiffness [s]
@@ -31,9 +31,9 @@ struct Tally {
   }
 };
 
-BodyMesh recover_body(const SceneOptions& options) { return load_body(options, "torus"); }
+BodyMesh body(const SceneOptions& options) { return load_body(options, "torus"); }
 
-SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   Elasticity elastic = elasticity(options, body.solid(), jelly, ElasticModel::neo_hookean, 2);
   const Eigen::Matrix3Xd& rest = body.vertices();
   SceneSetup setup{
@@ -63,10 +63,10 @@ SceneSetup recover(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace recover
 
 const SceneEntry recover_scene{"recover",
                                "a body finds back to its rest shape: squashed, flattened, mirrored, scrambled", 16,
-                               recover_body, recover};
+                               recover::body, recover::setup};
 
 }  // namespace penalty::demo

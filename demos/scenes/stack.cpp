@@ -8,7 +8,7 @@
 #include "scenes/scene_setup.h"
 
 namespace penalty::demo {
-namespace {
+namespace stack {
 
 constexpr Material jelly{.young = 4e5, .poisson = 0.35, .density = 1000};
 constexpr Real damping = 0.06;                                // [s]
@@ -20,7 +20,7 @@ constexpr Real reach = 0.05;                                  // of what is meas
 constexpr Real twist = 14;                                    // of each against the one below [degrees]
 constexpr bool is_soft[] = {true, true, false, true, false};  // from below
 
-BodyMesh stack_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "stack");
   const int cells = cells_in(options, 6, 2, 30);
   TetMesh box = make_box({width, height, width}, {cells, std::max(1, 2 * cells / 3), cells});
@@ -46,7 +46,7 @@ Real lean(const SceneState& state) {
   return most;
 }
 
-SceneSetup stack(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   SceneSetup setup{.name = "stack",
                    .title = "A pile of soft and rigid boxes",
                    .gravity = {0, -9.81, 0},
@@ -85,9 +85,9 @@ SceneSetup stack(const SceneOptions& options, const BodyMesh& body) {
   return setup;
 }
 
-}  // namespace
+}  // namespace stack
 
 const SceneEntry stack_scene{"stack", "boxes of jelly with rigid ones between and above them stand and come to rest", 6,
-                             stack_body, stack};
+                             stack::body, stack::setup};
 
 }  // namespace penalty::demo

@@ -7,7 +7,7 @@
 #include "scenes/shell.h"
 
 namespace penalty::demo {
-namespace {
+namespace tear {
 
 constexpr Real width = 1.6, height = 1, ground_clearance = 0.25;  // [m]
 constexpr Fabric foil{{.young = 1e6, .poisson = poisson_of_springs, .density = 500},
@@ -32,7 +32,7 @@ std::vector<Fact> facts(const SceneState& state) {
           {"energy_of_broken_springs", energy}};
 }
 
-BodyMesh tear_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "tear");
   refuse_model(options, "tear");
   const int cells = cells_in(options, 48, 8, 200), rows = std::max(4, 5 * cells / 8);
@@ -48,7 +48,7 @@ BodyMesh tear_body(const SceneOptions& options) {
   return {std::move(sheet)};
 }
 
-SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   if (options.start.value_or(Start::rest) != Start::rest)
     throw std::invalid_argument("scene tear starts at rest: from elsewhere it would break");
   if (options.poisson || options.young || options.stiffness)
@@ -85,8 +85,8 @@ SceneSetup tear(const SceneOptions& options, const BodyMesh& body) {
           .facts = facts};
 }
 
-}  // namespace
+}  // namespace tear
 
-const SceneEntry tear_scene{"tear", "a notched sheet is pulled apart and rips", 2, tear_body, tear};
+const SceneEntry tear_scene{"tear", "a notched sheet is pulled apart and rips", 2, tear::body, tear::setup};
 
 }  // namespace penalty::demo

@@ -11,7 +11,7 @@
 #include "scenes/start_shapes.h"
 
 namespace penalty::demo {
-namespace {
+namespace user_constraint {
 
 constexpr Real length = 1.8, width = 0.3, ground_clearance = 0.1;  // [m]
 constexpr int default_cells = 36;
@@ -59,7 +59,7 @@ Real num_turns(const Positions& x, const PotentialField& field, Real num_section
   return angle / static_cast<Real>(missing.size()) * num_sections / (2 * std::numbers::pi);
 }
 
-BodyMesh user_constraint_body(const SceneOptions& options) {
+BodyMesh body(const SceneOptions& options) {
   refuse_mesh(options, "user_constraint");
   const int cells = cells_in(options, default_cells, 12, 120), across = cells / 6;
   TetMesh bar = make_box({width, length, width}, {across, cells, across});
@@ -67,7 +67,7 @@ BodyMesh user_constraint_body(const SceneOptions& options) {
   return {std::move(bar)};
 }
 
-SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
+SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
   const Eigen::Matrix3Xd& rest = body.vertices();
   Elasticity elastic = elasticity(options, body.solid(), rubber);
   const int across = cells_in(options, default_cells, 12, 120) / 6;
@@ -102,10 +102,10 @@ SceneSetup user_constraint(const SceneOptions& options, const BodyMesh& body) {
           }};
 }
 
-}  // namespace
+}  // namespace user_constraint
 
 const SceneEntry user_constraint_scene{"user_constraint",
                                        "a bar winds itself up: its constraint is a twist, written in the scene", 5,
-                                       user_constraint_body, user_constraint};
+                                       user_constraint::body, user_constraint::setup};
 
 }  // namespace penalty::demo

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "math/random.h"
+#include "kinds/samples.h"
 #include "penalty/kinds/enclosed_volume.h"
 #include "penalty/kinds/length.h"
 #include "penalty/kinds/tetrahedron_volume.h"
@@ -11,9 +11,6 @@
 namespace penalty::testing {
 namespace {
 
-constexpr auto volume_of = [](const auto& p) {
-  return (p.col(1) - p.col(0)).dot((p.col(2) - p.col(0)).cross(p.col(3) - p.col(0))) / 6;
-};
 constexpr auto angle_of = [](const auto& p) {
   const auto e = (p.col(1) - p.col(0)).eval(), f = (p.col(2) - p.col(0)).eval();
   return atan2(e.cross(f).norm(), e.dot(f));

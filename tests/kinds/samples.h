@@ -35,6 +35,11 @@ template <class Kind>
 struct IsInternal : std::bool_constant<IsFixedConstraint<Kind>::value && conserves_momentum<Kind>> {};
 using InternalTypes = TypesThat<OwnKinds, IsInternal>::Type;
 
+/// The volume of a tetrahedron, positive for that of the unit axes; of columns of any scalar.
+inline constexpr auto volume_of = [](const auto& p) {
+  return (p.col(1) - p.col(0)).dot((p.col(2) - p.col(0)).cross(p.col(3) - p.col(0))) / 6;
+};
+
 enum class Shape { noisy, stretched, compressed, inverted, anywhere };
 inline constexpr unsigned num_shapes = 5;
 inline constexpr unsigned num_samples = 500;

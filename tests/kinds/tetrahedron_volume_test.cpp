@@ -7,7 +7,7 @@ namespace penalty::testing {
 namespace {
 
 // Two orthonormal legs and a third: V = 1/6 if the last is +z.
-Points<4> corner(const Vector3& p3 = {0, 0, 1}) {
+Points<4> unit_tetrahedron(const Vector3& p3 = {0, 0, 1}) {
   Points<4> p;
   p << Vector3(0, 0, 0), Vector3(1, 0, 0), Vector3(0, 1, 0), p3;
   return p;
@@ -25,17 +25,17 @@ Vector3 seed_force(Real stiffness, Real rest_volume, const Points<4>& p, const s
 constexpr std::array<std::array<int, 4>, 4> even_permutations{{{0, 1, 2, 3}, {1, 0, 3, 2}, {2, 3, 0, 1}, {3, 2, 1, 0}}};
 
 TEST(TetrahedronVolume, OfAnOrthogonalCornerIsASixth) {
-  EXPECT_DOUBLE_EQ(TetrahedronVolume::signed_volume(corner()), 1.0 / 6);
-  EXPECT_DOUBLE_EQ(TetrahedronVolume::signed_volume(corner({0, 0, -1})), -1.0 / 6);
-  const TetrahedronVolume kind = TetrahedronVolume::at_rest(corner());
+  EXPECT_DOUBLE_EQ(TetrahedronVolume::signed_volume(unit_tetrahedron()), 1.0 / 6);
+  EXPECT_DOUBLE_EQ(TetrahedronVolume::signed_volume(unit_tetrahedron({0, 0, -1})), -1.0 / 6);
+  const TetrahedronVolume kind = TetrahedronVolume::at_rest(unit_tetrahedron());
   EXPECT_DOUBLE_EQ(kind.rest_volume(), 1.0 / 6);
-  EXPECT_DOUBLE_EQ(kind.value(corner({5, -7, 3})), 2);   // only the height counts
-  EXPECT_DOUBLE_EQ(kind.value(corner({0, 0, -1})), -2);  // inverted
+  EXPECT_DOUBLE_EQ(kind.value(unit_tetrahedron({5, -7, 3})), 2);   // only the height counts
+  EXPECT_DOUBLE_EQ(kind.value(unit_tetrahedron({0, 0, -1})), -2);  // inverted
 }
 
 TEST(TetrahedronVolume, GradientOfAPointIsAlongTheNormalOfTheOppositeFace) {
   // V = z3 / 6 for these points, so dC/dp3 = (0, 0, 1) with V0 = 1/6, and dC/dp0 = -(1, 1, 1) by symmetry.
-  const Gradient<4> gradient = TetrahedronVolume::at_rest(corner()).gradient(corner());
+  const Gradient<4> gradient = TetrahedronVolume::at_rest(unit_tetrahedron()).gradient(unit_tetrahedron());
   EXPECT_LT((gradient.col(3) - Vector3(0, 0, 1)).norm(), 1e-15);
   EXPECT_LT((gradient.col(0) + Vector3(1, 1, 1)).norm(), 1e-15);
 }
@@ -77,36 +77,36 @@ TEST(TetrahedronVolume, SeedEquation20UnderTheCyclicShiftTurnsTheVolumeAndIsWron
 }
 
 TEST(TetrahedronVolume, AnInvertedTetrahedronIsPulledBackThroughFlat) {
-  const TetrahedronVolume kind = TetrahedronVolume::at_rest(corner());
+  const TetrahedronVolume kind = TetrahedronVolume::at_rest(unit_tetrahedron());
   for (const Real height : {-1.0, -0.1, 0.0, 0.1, 0.9}) {
     SCOPED_TRACE("height " + std::to_string(height));
-    EXPECT_GT(force(kind, 1, corner({0, 0, height}))(2, 3), 0);
+    EXPECT_GT(force(kind, 1, unit_tetrahedron({0, 0, height}))(2, 3), 0);
   }
 }
 
 TEST(TetrahedronVolume, ANegativeRestVolumeIsAsGoodAsAPositiveOne) {
-  const TetrahedronVolume kind = TetrahedronVolume::at_rest(corner({0, 0, -1}));
+  const TetrahedronVolume kind = TetrahedronVolume::at_rest(unit_tetrahedron({0, 0, -1}));
   EXPECT_DOUBLE_EQ(kind.rest_volume(), -1.0 / 6);
-  EXPECT_EQ(kind.value(corner({0, 0, -1})), 0);
-  EXPECT_DOUBLE_EQ(kind.value(corner({0, 0, -2})), 1);
+  EXPECT_EQ(kind.value(unit_tetrahedron({0, 0, -1})), 0);
+  EXPECT_DOUBLE_EQ(kind.value(unit_tetrahedron({0, 0, -2})), 1);
   // The mirror image of the force on the positive one.
-  const Gradient<4> force_below = force(kind, 1, corner({0, 0, -2}));
-  Gradient<4> mirrored = force(TetrahedronVolume::at_rest(corner()), 1, corner({0, 0, 2}));
+  const Gradient<4> force_below = force(kind, 1, unit_tetrahedron({0, 0, -2}));
+  Gradient<4> mirrored = force(TetrahedronVolume::at_rest(unit_tetrahedron()), 1, unit_tetrahedron({0, 0, 2}));
   mirrored.row(2) *= -1;
   ASSERT_GT(mirrored.norm(), 1);
   EXPECT_LT(relative_error(force_below, mirrored), 1e-15);
 }
 
 TEST(TetrahedronVolume, OnlyCollinearPointsHaveNoGradient) {
-  const TetrahedronVolume kind = TetrahedronVolume::at_rest(corner());
+  const TetrahedronVolume kind = TetrahedronVolume::at_rest(unit_tetrahedron());
   Points<4> line;
   for (int k = 0; k < 4; ++k) line.col(k) = k * Vector3(1, 2, -1);
   EXPECT_TRUE(kind.gradient(line).isZero(1e-15));
-  EXPECT_GT(kind.gradient(corner({0.3, 0.3, 0})).norm(), 1);
+  EXPECT_GT(kind.gradient(unit_tetrahedron({0.3, 0.3, 0})).norm(), 1);
 }
 
 TEST(TetrahedronVolume, RefusesFlatRestShapesByName) {
-  EXPECT_EQ(complaint<std::invalid_argument>([] { TetrahedronVolume::at_rest(corner({1, 1, 0})); }),
+  EXPECT_EQ(complaint<std::invalid_argument>([] { TetrahedronVolume::at_rest(unit_tetrahedron({1, 1, 0})); }),
             "tetrahedron volume: rest volume is 0");
 }
 

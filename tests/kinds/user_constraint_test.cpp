@@ -14,9 +14,6 @@ namespace {
 
 constexpr auto length_of = [](const auto& p) { return (p.col(1) - p.col(0)).norm(); };
 constexpr auto area_of = [](const auto& p) { return (p.col(1) - p.col(0)).cross(p.col(2) - p.col(0)).norm() / 2; };
-constexpr auto volume_of = [](const auto& p) {
-  return (p.col(1) - p.col(0)).dot((p.col(2) - p.col(0)).cross(p.col(3) - p.col(0))) / 6;
-};
 
 Gradient<2> gradient_of_length(const Points<2>& p) {
   const Vector3 n = (p.col(1) - p.col(0)).normalized();
