@@ -34,6 +34,7 @@ BackwardEuler::BackwardEuler(Island& island, ImplicitSurfaces& surfaces, Real du
       enough_(state_.enough) {
   if (!state_.contact_scratch) state_.contact_scratch = std::make_shared<ImplicitContactScratch>();
   Eigen::Index column = 0;
+  newton_.tries_exact = true;
   newton_.linear = {.max_iterations = 0, .tolerance = 1};
   newton_.objective.bodies.clear();
   newton_.objective.inverse_duration = 1 / duration;

@@ -38,12 +38,12 @@ void LinearSystem::multiply(const PackedVectors& x, PackedVectors& y) const {
   clear_fixed(y);
 }
 
-void LinearSolver::factorize(const LinearSystem& system) {
+bool LinearSolver::factorize(const LinearSystem& system) {
   for (PackedVectors* v : {&residual_, &preconditioned_, &search_, &product_})
     if (v->cols() != system.num_columns()) v->setZero(4, system.num_columns());
   gather(system);
-  invert_diagonal(system);
-  factorize_coarse(system);
+  const bool is_positive = invert_diagonal(system);
+  return factorize_coarse(system) && is_positive;
 }
 
 void LinearSolver::gather(const LinearSystem& system) {
@@ -64,7 +64,8 @@ void LinearSolver::gather(const LinearSystem& system) {
   });
 }
 
-void LinearSolver::invert_diagonal(const LinearSystem& system) {
+bool LinearSolver::invert_diagonal(const LinearSystem& system) {
+  bool is_positive = true;
   for (const ContactStiffness& contact : system.contacts) {
     const ContactSides& sides = contact.sides;
     for (int k = 0; k < sides.num_particles; ++k)
@@ -73,10 +74,13 @@ void LinearSolver::invert_diagonal(const LinearSystem& system) {
   for (Matrix3& block : inverse_diagonal_) {
     const Real trace = block.trace();
     block.diagonal().array() += trace > 0 ? 1e-12 * trace : 1;
+    is_positive =
+        is_positive && block(0, 0) > 0 && block.topLeftCorner<2, 2>().determinant() > 0 && block.determinant() > 0;
     block = block.inverse().eval();
   }
   for (std::size_t i = 0; i < moves_.size(); ++i)
     if (moves_[i] == 0) inverse_diagonal_[i].setZero();
+  return is_positive;
 }
 
 // What a contact adds to it, group by group: a rigid body, at its arm, moves by t + w x arm, too.
@@ -106,10 +110,10 @@ void LinearSolver::add_coarse_contact(const ContactStiffness& contact) {
   }
 }
 
-void LinearSolver::factorize_coarse(const LinearSystem& system) {
+bool LinearSolver::factorize_coarse(const LinearSystem& system) {
   const Eigen::Index of_particles = 6 * Eigen::Index(num_groups_);
   const Eigen::Index size = of_particles + 6 * static_cast<Eigen::Index>(system.rigid_bodies.size());
-  if (size == 0) return;
+  if (size == 0) return true;
   coarse_.resize(size, size);
   coarse_scale_.resize(size);
   coarse_vector_.resize(size);
@@ -133,7 +137,9 @@ void LinearSolver::factorize_coarse(const LinearSystem& system) {
     coarse_(column, column) = 1 + coarse_shift;
   }
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(coarse_);
-  if (cholesky.info() != Eigen::Success) coarse_scale_.setZero();  // no coarse space, then
+  const bool is_positive = cholesky.info() == Eigen::Success;
+  if (!is_positive) coarse_scale_.setZero();  // no coarse space, then
+  return is_positive;
 }
 
 void LinearSolver::precondition(const PackedVectors& r, PackedVectors& z) {
@@ -174,12 +180,14 @@ int LinearSolver::solve(const LinearSystem& system, const PackedVectors& b, cons
   Real rz = residual_.cwiseProduct(preconditioned_).sum();
   int iterations = 0;
   const Real enough = options.tolerance * options.tolerance * rz;
+  was_positive_ = !(rz < 0);
   if (!(rz > 0)) return 0;
   search_ = preconditioned_;
   while (iterations < options.max_iterations) {
     system.multiply(search_, product_);
     const Real curvature = search_.cwiseProduct(product_).sum();
-    if (!(curvature > 0)) break;
+    was_positive_ = curvature > 0;
+    if (!was_positive_) break;
     const Real length = rz / curvature;
     x += length * search_;
     residual_ -= length * product_;

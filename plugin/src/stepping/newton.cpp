@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "implicit_contacts.h"
 
@@ -9,9 +10,12 @@ namespace penalty {
 namespace {
 
 constexpr Real sufficient = 1e-4;  // share of the predicted fall that a step has to keep (Armijo)
-constexpr int most_backtracks = 30;
+constexpr int most_trials = 30;
+constexpr Real steep = 0.85;       // share of the slope that is left after a short step: there is further to go,
+constexpr Real close = 0.05;       // unless what was too long is no longer than this share more
 constexpr Real round_off = 1e-13;  // of the terms of Phi: below it the slope decides instead
 constexpr Real epsilon = 1e-16;
+constexpr int projected_at_once = 4;  // assemblies, where the exact stiffness was not positive definite
 
 }  // namespace
 
@@ -35,11 +39,11 @@ void NewtonBody::limit_groups(int most) {
   has_stiffness_ = false;
 }
 
-void NewtonBody::assemble(const Positions& positions, Real regularization) {
+void NewtonBody::assemble(const Positions& positions, StiffnessModel model, Real regularization) {
   System& matrix = matrix_.values;
   const int num_particles = matrix.num_particles();
   matrix.set_zero();
-  field_->add_stiffness(positions, StiffnessModel::psd_projected, matrix);
+  field_->add_stiffness(positions, model, matrix);
   if (damped_from.size() != 0) matrix.add(damping_);
   Real stiffness = 0;
   for (int i = 0; i < num_particles; ++i) stiffness += matrix.blocks().diagonal(i).trace() / 3;
@@ -50,6 +54,7 @@ void NewtonBody::assemble(const Positions& positions, Real regularization) {
   for (int i = 0; i < num_particles; ++i) matrix.add_to_diagonal(i, (weights.empty() ? 0 : weights[i]) + shift);
   matrix_.factorize(positions);
   has_stiffness_ = true;
+  is_exact_ = model == StiffnessModel::exact;
   assembled_at_ = positions;
   assembled_weights_ = weights;
 }
@@ -139,6 +144,7 @@ void NewtonSolver::prepare() {
 }
 
 void NewtonSolver::start(const PackedVectors& x) {
+  projected_ = 0;
   here_.positions = x;
   evaluate(here_);
 }
@@ -150,21 +156,40 @@ void NewtonSolver::offer(const PackedVectors& x) {
 }
 
 void NewtonSolver::assemble(const PackedVectors& x) {
+  const StiffnessModel model = tries_exact && projected_ == 0 ? StiffnessModel::exact : StiffnessModel::psd_projected;
   Eigen::Index first = 0;
+  bool any = false;
   for (NewtonBody* body : objective.bodies) {
     const Eigen::Index count = body->num_particles();
-    if (!body->has_stiffness()) body->assemble(x.middleCols(first, count), regularization);
+    if (!body->has_stiffness()) {
+      body->assemble(x.middleCols(first, count), model, regularization);
+      any = true;
+    }
     first += count;
   }
+  if (any && projected_ > 0) --projected_;
+}
+
+// Returns whether there was any exact stiffness, which is forgotten.
+bool NewtonSolver::leave_exact() {
+  bool any = false;
+  for (NewtonBody* body : objective.bodies)
+    if (body->is_exact_ && body->has_stiffness()) {
+      body->forget_stiffness();
+      any = true;
+    }
+  if (any) projected_ = projected_at_once;
+  return any;
 }
 
 void NewtonSolver::linearize() {
-  assemble(here_.positions);
-  system_.rigid_bodies = objective.rigid_bodies;
-  system_.contacts.clear();
-  right_side_ = -here_.gradient;
-  if (objective.contacts) objective.contacts->linearize(here_.positions, system_.contacts, right_side_);
-  solver_.factorize(system_);
+  do {
+    assemble(here_.positions);
+    system_.rigid_bodies = objective.rigid_bodies;
+    system_.contacts.clear();
+    right_side_ = -here_.gradient;
+    if (objective.contacts) objective.contacts->linearize(here_.positions, system_.contacts, right_side_);
+  } while (!solver_.factorize(system_) && leave_exact());
 }
 
 NewtonIteration NewtonSolver::iterate() {
@@ -176,15 +201,22 @@ NewtonIteration NewtonSolver::iterate() {
 NewtonIteration NewtonSolver::descend() {
   NewtonIteration iteration;
   iteration.linear_iterations = solver_.solve(system_, right_side_, linear, direction_);
-  const Real slope = here_.gradient.cwiseProduct(direction_).sum();
+  if (!solver_.was_positive() && leave_exact()) {
+    linearize();
+    iteration.linear_iterations += solver_.solve(system_, right_side_, linear, direction_);
+  }
+  Real slope = here_.gradient.cwiseProduct(direction_).sum();
   if (!(slope < 0)) return iteration;
   const auto of_particles = direction_.leftCols(system_.num_particles());
   iteration.displacement = std::sqrt(of_particles.colwise().squaredNorm().maxCoeff());
 
   Real energy_noise = 0;
   for (const NewtonBody* body : objective.bodies) energy_noise += body->energy_noise_;
+  // Contacts bend Phi sharply. Where a step was too long and the next one hardly changes the slope, the bend is in between:
+  // short steps alone would creep up to it.
   Real length = objective.contacts ? objective.contacts->longest(direction_) : 1;
-  for (int k = 0; k < most_backtracks; ++k) {
+  Real too_long = std::numeric_limits<Real>::infinity();
+  for (int k = 0; k < most_trials; ++k) {
     trial_.positions = here_.positions + length * direction_;
     evaluate(trial_);
     const Real fall = here_.value - trial_.value;
@@ -194,12 +226,18 @@ NewtonIteration NewtonSolver::descend() {
         std::abs(fall) <= round_off * here_.magnitude + energy_noise && std::abs(new_slope) < -0.9 * slope;
     if (falls || flat) {
       std::swap(here_, trial_);
-      iteration.length = length;
-      return iteration;
+      iteration.length += length;
+      too_long -= length;
+      const bool creeps = objective.contacts && std::isfinite(too_long) && new_slope <= steep * slope;
+      if (flat || !creeps || !(too_long > close * iteration.length)) break;
+      slope = new_slope;
+      length = 0.5 * too_long;
+    } else {
+      too_long = length;
+      // The parabola through both values and the first slope, within reason.
+      const Real parabola = -slope * length / (2 * (-fall / length - slope));
+      length = std::isfinite(parabola) ? std::clamp(parabola, 0.1 * length, 0.5 * length) : 0.1 * length;
     }
-    // The parabola through both values and the first slope, within reason.
-    const Real parabola = -slope * length / (2 * (-fall / length - slope));
-    length = std::isfinite(parabola) ? std::clamp(parabola, 0.1 * length, 0.5 * length) : 0.1 * length;
   }
   return iteration;
 }

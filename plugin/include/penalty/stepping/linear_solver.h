@@ -111,12 +111,16 @@ struct LinearSystem {
 /// without allocation once a system of the same size has been solved.
 class LinearSolver {
  public:
-  /// Prepares the preconditioner for the values of the system, whose bodies have made their parts of it.
-  void factorize(const LinearSystem& system);
+  /// Prepares the preconditioner for the values of the system, whose bodies have made their parts of it. Returns whether it is
+  /// positive definite, as that of a positive definite system is.
+  bool factorize(const LinearSystem& system);
 
   /// Solves A x = b from x = 0; the columns of fixed particles become zero. Returns the number of iterations; whatever it
   /// is, b . x > 0 unless b is zero or not finite.
   int solve(const LinearSystem& system, const PackedVectors& b, const LinearOptions& options, PackedVectors& x);
+
+  /// Whether the last solution met positive curvature only.
+  bool was_positive() const { return was_positive_; }
 
   /// r . P⁻¹ r, P the preconditioner.
   Real squared_norm(const PackedVectors& r);
@@ -128,10 +132,11 @@ class LinearSolver {
  private:
   void precondition(const PackedVectors& r, PackedVectors& z);
   void gather(const LinearSystem& system);
-  void invert_diagonal(const LinearSystem& system);
-  void factorize_coarse(const LinearSystem& system);
+  bool invert_diagonal(const LinearSystem& system);
+  bool factorize_coarse(const LinearSystem& system);
   void add_coarse_contact(const ContactStiffness& contact);
 
+  bool was_positive_ = true;
   Eigen::Index num_particles_ = 0;
   int num_groups_ = 0;         // of particles
   std::vector<int> group_of_;  // of each particle

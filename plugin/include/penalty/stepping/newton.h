@@ -45,14 +45,14 @@ class NewtonBody {
 
  private:
   friend class NewtonSolver;
-  void assemble(const Positions& x, Real regularization);
+  void assemble(const Positions& x, StiffnessModel model, Real regularization);
 
   const PotentialField* field_ = nullptr;  // that the pattern was made of
   std::size_t num_elements_ = 0;
   int most_groups_ = BodyMatrix::most_groups;
   BodyMatrix matrix_;
   System damping_;
-  bool has_stiffness_ = false;
+  bool has_stiffness_ = false, is_exact_ = false;
   PackedVectors assembled_at_;
   std::vector<Real> assembled_weights_;
   Real energy_noise_ = 0;  // of the potential, a guess [J]
@@ -81,9 +81,10 @@ struct NewtonIteration {
   int linear_iterations = 0;
 };
 
-/// Minimises by Newton's method: the stiffness of every element is projected on the positive semidefinite matrices, so
-/// that each direction leads downhill, and the line search makes sure that Phi falls, or, where that is lost in
-/// round-off, its slope. Deterministic, and without allocation once the pattern is made and a step was taken.
+/// Minimises by Newton's method. The stiffness of every element is projected on the positive semidefinite matrices, so that
+/// each direction leads downhill; or it is exact as long as the whole matrix turns out positive definite, which takes fewer
+/// iterations. The line search makes sure that Phi falls, or, where that is lost in round-off, its slope. Deterministic, and
+/// without allocation once the pattern is made and a step was taken.
 class NewtonSolver {
  public:
   /// To be filled in before `prepare`, which makes the damping matrices. The pattern of each body is to be there.
@@ -93,6 +94,9 @@ class NewtonSolver {
   LinearOptions linear;
   /// Share of the mean stiffness that is added to the diagonal: what has no inertia may be free to move.
   Real regularization = 0;
+
+  /// Whether the exact stiffness is tried, too.
+  bool tries_exact = false;
 
   /// Begins at `x`, or, if Phi is less there, moves to `x`.
   void start(const PackedVectors& x);
@@ -143,9 +147,11 @@ class NewtonSolver {
 
   void evaluate(State& state);
   OfBody evaluate(const NewtonBody& body, Eigen::Index first, State& state);
+  bool leave_exact();
 
   LinearSystem system_;
   LinearSolver solver_;
+  int projected_ = 0;  // assemblies that are to be projected
   State here_, trial_;
   PackedVectors direction_, right_side_, displacement_, damping_force_;
 };
