@@ -50,7 +50,7 @@ void BackwardEuler::book(const NewtonIteration& iteration) {
 void BackwardEuler::minimize() {
   enough_.clear();
   for (int k = 0; k < most_iterations_; ++k) {
-    forget_stiffness();
+    k == 0 ? keep_stiffness() : forget_stiffness();
     newton_.linearize();
     if (k == 0) {
       newton_.squared_residual();
