@@ -33,8 +33,9 @@ struct Minimisation {
     solver.start(start);
   }
 
-  Real least_eigenvalue(StiffnessModel model) const {
-    const System matrix = assembled(field, solver.positions(), model);
+  // Of the exact matrix [N/m].
+  Real least_eigenvalue() const {
+    const System matrix = assembled(field, solver.positions(), StiffnessModel::exact);
     const Eigen::Index n = field.num_particles();
     Eigen::MatrixXd dense(3 * n, 3 * n);
     for (Eigen::Index k = 0; k < 3 * n; ++k) {
@@ -56,19 +57,15 @@ struct Minimisation {
 
   int iterations_to(Real small) {
     int count = 0;
-    while (imbalance() > small && count < 200) {
-      const Real before = solver.value();
-      EXPECT_GT(solver.iterate().length, 0);
-      EXPECT_LE(solver.value(), before + 1e-12);
-      ++count;
-    }
+    while (imbalance() > small && count < 200 && solver.iterate().length > 0) ++count;
+    EXPECT_LE(imbalance(), small);
     return count;
   }
 };
 
 TEST(NewtonSolver, TakesFewerIterationsWithTheExactStiffness) {
   Minimisation projected(1.2, 1500, false), exact(1.2, 1500, true);
-  ASSERT_GT(exact.least_eigenvalue(StiffnessModel::exact), 0);
+  ASSERT_GT(exact.least_eigenvalue(), 0);
   const int fewer = exact.iterations_to(1e-8), more = projected.iterations_to(1e-8);
   EXPECT_LT(fewer, more);
   EXPECT_LE(fewer, 6) << "quadratic convergence";
@@ -79,10 +76,10 @@ TEST(NewtonSolver, FindsTheMinimumFromWhereTheExactStiffnessIsIndefinite) {
   for (const Real scale : {0.5, 0.7}) {
     SCOPED_TRACE(scale);
     Minimisation projected(scale, 0.1, false), exact(scale, 0.1, true);
-    ASSERT_LT(exact.least_eigenvalue(StiffnessModel::exact), 0);
+    ASSERT_LT(exact.least_eigenvalue(), 0);
     EXPECT_LT(exact.iterations_to(1e-8), 100);
     EXPECT_LT(projected.iterations_to(1e-8), 100);
-    EXPECT_GT(exact.least_eigenvalue(StiffnessModel::exact), 0) << "no saddle";
+    EXPECT_GT(exact.least_eigenvalue(), 0) << "no saddle";
     EXPECT_NEAR(exact.solver.value(), projected.solver.value(), 1e-9);
   }
 }

@@ -11,8 +11,8 @@ namespace {
 
 constexpr Real sufficient = 1e-4;  // share of the predicted fall that a step has to keep (Armijo)
 constexpr int most_trials = 30;
-constexpr Real steep = 0.85;       // share of the slope that is left after a short step: there is further to go,
-constexpr Real close = 0.05;       // unless what was too long is no longer than this share more
+constexpr Real steep = 0.85;       // share of the slope that is left where a step ended far short of a bend of Phi
+constexpr Real close = 0.05;       // to the bend: what is left of a step that was too long, by what was taken
 constexpr Real round_off = 1e-13;  // of the terms of Phi: below it the slope decides instead
 constexpr Real epsilon = 1e-16;
 constexpr int projected_at_once = 4;  // assemblies, where the exact stiffness was not positive definite
@@ -132,6 +132,7 @@ void NewtonSolver::evaluate(State& state) {
 }
 
 void NewtonSolver::prepare() {
+  projected_ = 0;
   system_.bodies.clear();
   for (NewtonBody* body : objective.bodies) {
     system_.bodies.push_back(&body->matrix_);
@@ -144,7 +145,6 @@ void NewtonSolver::prepare() {
 }
 
 void NewtonSolver::start(const PackedVectors& x) {
-  projected_ = 0;
   here_.positions = x;
   evaluate(here_);
 }
