@@ -70,6 +70,9 @@ try() {  # NAME COMMAND...
     sed "s/^/$name: /" "$TMPDIR/$name.log"
   } &
 }
+for precision in "${precisions[@]}"; do  # takes longest
+  try "allocations_$precision" "$programs/nth_allocation_$precision" --stride "$stride"
+done
 for reader in "${readers[@]}"; do
   leaks=1 memory=1024  # [MB]
   # Leaks are looked for after each input that may have leaked. Assimp does so with every other broken file: it is looked at
@@ -81,9 +84,6 @@ for reader in "${readers[@]}"; do
 done
 for precision in "${precisions[@]}"; do
   try "sequences_$precision" "$programs/api_sequences_$precision" --seed "$seed" --count 1000000000 --seconds "$duration"
-done
-for precision in "${precisions[@]}"; do
-  try "allocations_$precision" "$programs/nth_allocation_$precision" --stride "$stride"
 done
 wait
 

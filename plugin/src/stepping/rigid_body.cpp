@@ -21,6 +21,13 @@ Eigen::VectorXd of_links(const Articulation& articulation, const RigidBody& firs
   return all;
 }
 
+// a' I b; angular factors may leave the inverse of the inertia I singular.
+Real inertial_product(const Matrix3& inverse_inertia, const Vector3& a, const Vector3& b) {
+  if (inverse_inertia.isZero(0)) return 0;
+  const Vector3 momentum = inverse_inertia.completeOrthogonalDecomposition().solve(b);
+  return a.dot(momentum);
+}
+
 }  // namespace
 
 bool RigidBody::is_free() const {
@@ -77,10 +84,7 @@ Real kinetic_energy(const RigidBody& body) {
   Real twice = 0;
   for (int axis = 0; axis < 3; ++axis)
     if (body.inverse_mass[axis] > 0) twice += body.velocity[axis] * body.velocity[axis] / body.inverse_mass[axis];
-  if (!body.inverse_inertia.isZero(0))  // angular factors may leave it singular
-    twice +=
-        body.angular_velocity.dot(body.inverse_inertia.completeOrthogonalDecomposition().solve(body.angular_velocity));
-  return twice / 2;
+  return (twice + inertial_product(body.inverse_inertia, body.angular_velocity, body.angular_velocity)) / 2;
 }
 
 Real work_of_accelerations(const RigidBody& body, const RigidBody& start) {
@@ -89,10 +93,7 @@ Real work_of_accelerations(const RigidBody& body, const RigidBody& start) {
     for (int axis = 0; axis < 3; ++axis)
       if (body.inverse_mass[axis] > 0)
         work += body.acceleration[axis] / body.inverse_mass[axis] * (body.position[axis] - start.position[axis]);
-    if (!body.angular_acceleration.isZero(0) && !start.inverse_inertia.isZero(0))
-      work += body.angular_acceleration.dot(
-          start.inverse_inertia.completeOrthogonalDecomposition().solve(body.turn - start.turn));
-    return work;
+    return work + inertial_product(start.inverse_inertia, body.angular_acceleration, body.turn - start.turn);
   }
   if (body.link != 0) return 0;
   const auto place = [](const RigidBody& link) { return std::pair(link.position, link.turn); };
