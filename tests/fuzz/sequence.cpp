@@ -160,6 +160,7 @@ AttachOptions Sequence::random_options(Body& body) {
     step.contact_safety = chance_.number(0.1, 1);
     step.energy_tolerance = chance_.number(0, 0.1);
     step.contact_slop = chance_.number(0, 0.01);
+    step.implicit_order = legal() ? 1 + chance_.index(2) : chance_.index(4);
     step.newton_iterations = legal() ? 1 + chance_.index(10) : chance_.index(12) - 1;
     step.newton_tolerance = chance_.number(1e-6, 0.1);
   }

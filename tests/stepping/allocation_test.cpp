@@ -37,9 +37,10 @@ TEST(Allocation, DampingDragGravityAndExternalForcesNeedNone) {
 }
 
 TEST(Allocation, AnImplicitStepNeedsNone) {
-  for (const bool pinned : {false, true}) {
+  for (const auto& [pinned, order] : {std::pair(false, 1), {true, 1}, {false, 2}, {true, 2}}) {
     Body beam = make_beam_body(1);
     beam.body.options.integrator = Integrator::implicit_step;
+    beam.body.options.implicit_order = order;
     beam.body.options.damping_time = 0.01;
     beam.body.gravity = Vector3(0, -10, 0);
     beam.body.external_forces = PackedVectors::Ones(4, beam.particles().size());

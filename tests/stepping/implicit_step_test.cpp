@@ -338,15 +338,18 @@ TEST(ImplicitStep, DampingOfABodyThatTurnsNeedsNoMoreSubstepsThanNone) {
 TEST(ImplicitStep, AutomaticChoosesByTheSubstepsThatItWouldTake) {
   Body cube = make_stretched_cube(1);
   cube.body.options.integrator = Integrator::automatic;
-  const auto used_at = [&](Real substeps) {
+  const auto used_at = [&](Real substeps, int order = 1) {
     const Real duration = 2 * 0.99 * substeps / std::sqrt(cube.body.largest_eigenvalue);
     Body copy = make_stretched_cube(1);
     copy.body.options.integrator = Integrator::automatic;
+    copy.body.options.implicit_order = order;
     advance(copy, duration);
     return copy.body.report.integrator;
   };
   EXPECT_EQ(used_at(0.9 * crossover_substeps), Integrator::explicit_step);
   EXPECT_EQ(used_at(1.1 * crossover_substeps), Integrator::implicit_step);
+  EXPECT_EQ(used_at(1.9 * crossover_substeps, 2), Integrator::explicit_step);
+  EXPECT_EQ(used_at(2.1 * crossover_substeps, 2), Integrator::implicit_step);
   cube.body.options.substeps = 7;  // who names a number of substeps wants them
   advance(cube, 1000);
   EXPECT_EQ(cube.body.report.integrator, Integrator::explicit_step);

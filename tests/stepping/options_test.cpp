@@ -26,6 +26,7 @@ TEST(StepOptions, NumbersOutOfRangeAreNamed) {
   EXPECT_EQ(refusal({.energy_tolerance = 0}), "step: energy_tolerance is 0, must be positive");
   EXPECT_EQ(refusal({.max_substeps = 0}), "step: max_substeps is 0, must be at least 1");
   EXPECT_EQ(refusal({.contact_slop = -1}), "step: contact_slop is -1, must be zero or positive [m]");
+  EXPECT_EQ(refusal({.implicit_order = 3}), "step: implicit_order is 3, must be 1 or 2");
   EXPECT_EQ(refusal({.newton_iterations = 0}), "step: newton_iterations is 0, must be at least 1");
   EXPECT_EQ(refusal({.newton_tolerance = 0}), "step: newton_tolerance is 0, must be in (0, 1)");
   EXPECT_EQ(refusal({.linear = {.max_iterations = 0}}), "step: linear.max_iterations is 0, must be at least 1");

@@ -37,7 +37,7 @@ BackwardEuler::BackwardEuler(Island& island, ImplicitSurfaces& surfaces, Real du
   newton_.tries_exact = true;
   newton_.linear = {.max_iterations = 0, .tolerance = 1};
   newton_.objective.bodies.clear();
-  newton_.objective.inverse_duration = 1 / duration;
+  is_second_order_ = true;
   for (SteppedBody* body : island.bodies) {
     body->implicit.first = column;
     column += body->particles.size();
@@ -48,8 +48,9 @@ BackwardEuler::BackwardEuler(Island& island, ImplicitSurfaces& surfaces, Real du
     newton_.linear.tolerance = std::min(newton_.linear.tolerance, options.linear.tolerance);
     most_iterations_ = std::max(most_iterations_, options.newton_iterations);
     gravity_ = std::max(gravity_, body->gravity.norm());
+    is_second_order_ = is_second_order_ && options.implicit_order == 2;
   }
-  state_.from.resize(4, column);
+  for (PackedVectors* all : {&state_.from, &state_.base, &state_.carried, &state_.velocities}) all->resize(4, column);
 }
 
 void BackwardEuler::prepare(SteppedBody& body) {
@@ -58,12 +59,21 @@ void BackwardEuler::prepare(SteppedBody& body) {
   newton.limit_groups(most_groups_of_each(island_.bodies.size()));
   const std::vector<Real>& inverse_masses = body.particles.inverse_masses;
   newton.clear_fixed();
-  newton.weights.resize(inverse_masses.size());
-  for (std::size_t i = 0; i < inverse_masses.size(); ++i) {
+  for (std::size_t i = 0; i < inverse_masses.size(); ++i)
     if (inverse_masses[i] == 0) newton.fix(static_cast<int>(i));
-    newton.weights[i] = inverse_or_zero(inverse_masses[i]) / (duration_ * duration_);
-  }
   newton.damping_time = body.options.damping_time;
+}
+
+void BackwardEuler::set_inertia_time(Real duration) {
+  inertia_time_ = duration;
+  newton_.objective.inverse_duration = 1 / duration;
+  for (SteppedBody* body : island_.bodies) {
+    const std::vector<Real>& inverse_masses = body->particles.inverse_masses;
+    std::vector<Real>& weights = body->implicit.newton.weights;
+    weights.resize(inverse_masses.size());
+    for (std::size_t i = 0; i < inverse_masses.size(); ++i)
+      weights[i] = inverse_or_zero(inverse_masses[i]) / (duration * duration);
+  }
 }
 
 void BackwardEuler::aim() {
@@ -73,18 +83,18 @@ void BackwardEuler::aim() {
 
 // Where the particles would be without elastic forces; pinned ones go where their velocity takes them.
 void BackwardEuler::aim(SteppedBody& body) {
-  const auto from = columns_of(body, state_.from);
+  const auto base = columns_of(body, state_.base);
   auto targets = columns_of(body, newton_.objective.targets);
-  targets = from + duration_ * body.particles.velocities;
+  targets = base + inertia_time_ * columns_of(body, state_.carried);
   for (int i = 0; i < body.particles.size(); ++i) {
     const Real inverse_mass = body.particles.inverse_masses[i];
     if (!(inverse_mass > 0)) continue;
     Vector3 acceleration = body.gravity;
     if (body.external_forces.size() != 0) acceleration += inverse_mass * body.external_forces.col(i).head<3>();
-    targets.col(i).head<3>() += duration_ * duration_ * acceleration;
+    targets.col(i).head<3>() += inertia_time_ * inertia_time_ * acceleration;
   }
   if (body.options.damping_time > 0 || body.field->damps())
-    body.implicit.newton.damped_from = from;
+    body.implicit.newton.damped_from = base;
   else
     body.implicit.newton.damped_from.resize(4, 0);
 }
@@ -146,24 +156,25 @@ void BackwardEuler::choose_start() {
     for (const int i : body->implicit.newton.fixed())
       state_.guess.col(body->implicit.first + i) = targets.col(body->implicit.first + i);
   newton_.offer(state_.guess);
-  if (!touches_) offer_rigid_motion();
+  if (touches_) return;
+  for (const SteppedBody* body : island_.bodies) columns_of(*body, state_.velocities) = body->particles.velocities;
+  offer_rigid_motion(duration_, state_.from, state_.velocities);
 }
 
 // Of all bodies that turn, the others as they were chosen.
-void BackwardEuler::offer_rigid_motion() {
+void BackwardEuler::offer_rigid_motion(Real interval, const PackedVectors& positions, const PackedVectors& velocities) {
   state_.guess = newton_.positions();
   bool does_any_turn = false;
   for (const SteppedBody* body : island_.bodies) {
     if (!is_free(*body)) continue;
-    const RigidState rigid(body->particles);
-    const Vector3 turn = duration_ * rigid.angular_velocity(rigid.spin);
+    const auto from = columns_of(*body, positions);
+    const RigidState rigid(from, columns_of(*body, velocities), body->particles.inverse_masses);
+    const Vector3 turn = interval * rigid.angular_velocity(rigid.spin);
     const Real angle = turn.norm();
     if (!(angle > 0)) continue;
     does_any_turn = true;
     const Matrix3 rotation = Eigen::AngleAxis<Real>(angle, turn / angle).toRotationMatrix();
-    const Vector3 center =
-        rigid.center + duration_ * rigid.momentum / rigid.mass + duration_ * duration_ * body->gravity;
-    const auto from = columns_of(*body, std::as_const(state_.from));
+    const Vector3 center = rigid.center + interval * rigid.momentum / rigid.mass + interval * interval * body->gravity;
     auto columns = columns_of(*body, state_.guess);
     for (int i = 0; i < body->particles.size(); ++i)
       columns.col(i).head<3>() = rotation * (from.col(i).head<3>() - rigid.center) + center;
@@ -180,20 +191,31 @@ void BackwardEuler::drift_rigid_bodies() {
   }
 }
 
+void BackwardEuler::take_at_once(ImplicitContacts& contacts) {
+  set_inertia_time(duration_);
+  for (SteppedBody* body : island_.bodies) {
+    columns_of(*body, state_.base) = body->particles.positions;
+    columns_of(*body, state_.carried) = body->particles.velocities;
+    body->implicit.first_stage = {};
+  }
+  aim();
+  newton_.prepare();
+  if (touches_) {
+    begin_in_contact(contacts);
+    minimize_in_contact(contacts);
+  } else {
+    choose_start();
+    minimize();
+  }
+}
+
 bool BackwardEuler::run() {
   for (const SteppedBody* body : island_.bodies) columns_of(*body, state_.from) = body->particles.positions;
   ImplicitContacts contacts(island_, state_.from, surfaces_, duration_);
   touches_ = !contacts.is_empty();
+  in_stages_ = is_second_order_ && !touches_ && !surfaces_;
   newton_.objective.contacts = touches_ ? &contacts : nullptr;
-  aim();
-  newton_.prepare();
-  if (!touches_) {
-    choose_start();
-    minimize();
-  } else {
-    begin_in_contact(contacts);
-    minimize_in_contact(contacts);
-  }
+  in_stages_ ? take_stages() : take_at_once(contacts);
   newton_.objective.contacts = nullptr;
   if (!surfaces_ && !island_.surfaces.empty() && std::isfinite(newton_.value()) &&
       all_surfaces_.meet(newton_.positions() - guess(false))) {
@@ -219,21 +241,22 @@ void BackwardEuler::end(std::size_t k, const ImplicitContacts& contacts) {
   body.step_flows.contacts += contacts.given_to(k).work;
   body.step_flows.contact_loss += contacts.given_to(k).loss;
   const auto end = columns_of(body, newton_.positions());
-  const auto from = columns_of(body, std::as_const(state_.from));
+  const auto from = columns_of(body, std::as_const(state_.from)), base = columns_of(body, std::as_const(state_.base));
   const RigidState before = is_free(body) ? RigidState(particles) : RigidState();
   state.acceleration = ((end - from) / duration_ - particles.velocities) / duration_;
   state.has_acceleration = true;
   for (int i = 0; i < particles.size(); ++i)
-    if (particles.inverse_masses[i] > 0) particles.velocities.col(i) = (end.col(i) - from.col(i)) / duration_;
+    if (particles.inverse_masses[i] > 0) particles.velocities.col(i) = (end.col(i) - base.col(i)) / inertia_time_;
   particles.positions = end;
   if (is_free(body)) restore_momenta(k, before, contacts);
 
   body.elastic_energy = newton_.elastic_energy(k);
   body.forces = columns_of(body, newton_.forces());
   for (const int i : state.newton.fixed())
-    body.step_flows.driving -= duration_ * body.forces.col(i).dot(particles.velocities.col(i));
+    body.step_flows.driving -= inertia_time_ * body.forces.col(i).dot(particles.velocities.col(i));
   if (body.external_forces.size() != 0) body.forces += body.external_forces;
-  body.step_flows.damping += newton_.damping_work(k);
+  body.step_flows.driving += state.first_stage.driving;
+  body.step_flows.damping += state.first_stage.damping + newton_.damping_work(k);
   if (body.field->evolves()) {
     const Real taken = body.field->evolve(particles.positions, duration_);
     body.step_flows.inelastic += taken;

@@ -1,4 +1,4 @@
-// Backward Euler steps of soft bodies and the rigid ones that they touch.
+// Implicit steps of soft bodies and the rigid ones that they touch: backward Euler, or TR-BDF2 where nothing touches.
 #pragma once
 #include "penalty/stepping/island.h"
 
@@ -15,6 +15,12 @@ auto columns_of(const SteppedBody& body, Columns& all) {
 }
 
 inline bool is_free(const SteppedBody& body) { return body.implicit.newton.fixed().empty(); }
+
+/// What a potential gives a body as a whole: nothing where it is its own.
+struct FromOutside {
+  Vector3 force, torque;  // about `center`
+  FromOutside(const Positions& forces, const Positions& positions, const Vector3& center);
+};
 
 /// Takes steps of `duration` [s]; whether their energy is right is for others to see.
 class BackwardEuler {
@@ -33,12 +39,18 @@ class BackwardEuler {
 
  private:
   void prepare(SteppedBody& body);
+  void set_inertia_time(Real duration);
+  void take_at_once(ImplicitContacts& contacts);
+  void take_stages();
+  void take_trapezoid();
+  void take_difference();
+  void minimize_stage(Real interval, const PackedVectors& positions, const PackedVectors& velocities);
   void aim();
   void aim(SteppedBody& body);
   void aim_rigid_bodies();
   const PackedVectors& guess(bool rigid_bodies_move);
   void choose_start();
-  void offer_rigid_motion();
+  void offer_rigid_motion(Real interval, const PackedVectors& positions, const PackedVectors& velocities);
   void keep_stiffness();
   void forget_stiffness();
   void book(const NewtonIteration& iteration);
@@ -56,11 +68,12 @@ class BackwardEuler {
   ImplicitState& state_;
   NewtonSolver& newton_;
   ImplicitSurfaces& all_surfaces_;
-  ImplicitSurfaces* surfaces_;  // if they may touch
-  Real duration_, outside_work_ = 0;
+  ImplicitSurfaces* surfaces_;        // if they may touch
+  Real duration_, inertia_time_ = 0;  // t: of masses / t² beside the stiffness
+  Real outside_work_ = 0;
   Real gravity_ = 0;  // largest of a body [m/s²]
   int most_iterations_ = 0;
-  bool touches_ = false;
+  bool touches_ = false, is_second_order_ = false, in_stages_ = false;
   std::vector<Real>& enough_;  // of the squared residual, for each body: the soft ones, then rigid ones
 };
 

@@ -57,7 +57,7 @@ void BackwardEuler::minimize() {
       for (const SteppedBody* body : island_.bodies) {
         const Real before = newton_.residual_share(body->implicit.first, body->particles.size());
         enough_.push_back(
-            std::max({square(body->options.newton_tolerance) * before, noise(*body, duration_), least_energy}));
+            std::max({square(body->options.newton_tolerance) * before, noise(*body, inertia_time_), least_energy}));
       }
     }
     const NewtonIteration iteration = newton_.descend();
@@ -89,8 +89,8 @@ void BackwardEuler::find_enough() {
       twice += weight * (objective.targets.col(column) - state_.from.col(column)).squaredNorm();
       ++column;
     }
-    least_noise = std::min(least_noise, noise(*body, duration_));
-    add({body->mass, twice, body->options.newton_tolerance, noise(*body, duration_)});
+    least_noise = std::min(least_noise, noise(*body, inertia_time_));
+    add({body->mass, twice, body->options.newton_tolerance, noise(*body, inertia_time_)});
   }
   for (const RigidInertia& inertia : objective.rigid_bodies) {
     Real twice = 0;

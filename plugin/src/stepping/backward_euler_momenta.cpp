@@ -1,6 +1,7 @@
 // The part of BackwardEuler that sets momenta and energy right.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "backward_euler.h"
 #include "implicit_contacts.h"
@@ -13,33 +14,41 @@ constexpr Real sum_round_off = 1e-12;  // of a sum of forces, relative to the su
 
 }  // namespace
 
+FromOutside::FromOutside(const Positions& forces, const Positions& positions, const Vector3& center)
+    : force(Vector3::Zero()), torque(Vector3::Zero()) {
+  Real magnitude = 0, torques = 0;
+  for (Eigen::Index i = 0; i < forces.cols(); ++i) {
+    const Vector3 f = forces.col(i).head<3>(), arm = positions.col(i).head<3>() - center;
+    force += f;
+    torque += arm.cross(f);
+    magnitude += f.norm();
+    torques += arm.norm() * f.norm();
+  }
+  if (force.norm() < sum_round_off * magnitude) force.setZero();
+  if (torque.norm() < sum_round_off * torques) torque.setZero();
+}
+
 // What the minimum, and iterations that end before it, take from the momenta of a free body.
 void BackwardEuler::restore_momenta(std::size_t k, const RigidState& before, const ImplicitContacts& contacts) {
   SteppedBody& body = *island_.bodies[k];
   Particles& particles = body.particles;
-  // Of the potential: only what acts from outside leaves any.
-  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();
-  Real forces = 0, torques = 0;
-  const auto all_forces = columns_of(body, newton_.forces()), positions = columns_of(body, newton_.positions());
-  for (int i = 0; i < particles.size(); ++i) {
-    const Vector3 f = all_forces.col(i).head<3>(), arm = positions.col(i).head<3>() - before.center;
-    force += f;
-    torque += arm.cross(f);
-    forces += f.norm();
-    torques += arm.norm() * f.norm();
-  }
-  if (force.norm() < sum_round_off * forces) force.setZero();
-  if (torque.norm() < sum_round_off * torques) torque.setZero();
-  const GivenInStep& given = contacts.given_to(k);
-  Vector3 momentum = before.momentum + duration_ * (before.mass * body.gravity + force) + given.impulse;
-  Vector3 spin = before.spin + duration_ * torque + given.moment_about(before.center);
-  if (body.external_forces.size() != 0)
-    for (int i = 0; i < particles.size(); ++i) {
-      const Vector3 impulse = duration_ * body.external_forces.col(i).head<3>();
-      momentum += impulse;
-      spin += (state_.from.col(body.implicit.first + i).head<3>() - before.center).cross(impulse);
-    }
   const RigidState now(particles);
+  const auto positions = columns_of(body, newton_.positions());
+  const Vector3 center = in_stages_ ? now.center : before.center;
+  const FromOutside outside(columns_of(body, newton_.forces()), positions, center);
+  const FirstStage& first = body.implicit.first_stage;
+  const GivenInStep& given = contacts.given_to(k);
+  Vector3 momentum = before.momentum + duration_ * before.mass * body.gravity + inertia_time_ * outside.force +
+                     first.impulse + given.impulse;
+  Vector3 spin = before.spin + inertia_time_ * outside.torque + first.moment + given.moment_about(before.center);
+  if (body.external_forces.size() != 0) {
+    const auto from = columns_of(body, std::as_const(in_stages_ ? newton_.positions() : state_.from));
+    for (int i = 0; i < particles.size(); ++i) {
+      const Vector3 impulse = inertia_time_ * body.external_forces.col(i).head<3>();
+      momentum += impulse;
+      spin += (from.col(i).head<3>() - center).cross(impulse);
+    }
+  }
   if (contacts.touch_immovable())
     spin = now.spin;  // is no longer its own: given back on a way that obstacles bend, it would gain energy
   else if (touches_)
@@ -50,7 +59,7 @@ void BackwardEuler::restore_momenta(std::size_t k, const RigidState& before, con
   for (int i = 0; i < particles.size(); ++i) {
     const Vector3 arm = particles.positions.col(i).head<3>() - now.center;
     particles.velocities.col(i).head<3>() += dv + dw.cross(arm);
-    if (!touches_) particles.positions.col(i).head<3>() += duration_ * dv;
+    if (!touches_) particles.positions.col(i).head<3>() += inertia_time_ * dv;
   }
 }
 

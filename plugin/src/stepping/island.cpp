@@ -35,21 +35,25 @@ bool lies(const Island& island) {
   return true;
 }
 
-// An impact is for substeps, as long as they can be taken: backward Euler would eat the rebound. All bodies take as many as
-// that which needs most.
+// An impact is for substeps, as long as they can be taken, unless somebody wants backward Euler, which eats the rebound. All
+// bodies take as many as that which needs most.
 bool wants_implicit_step(const Island& island, Real duration, bool touches) {
-  bool is_automatic = false, pays = false, is_too_stiff = false;
+  bool is_automatic = false, pays = false, is_too_stiff = false, may_bounce = true;
   for (const SteppedBody* body : island.bodies) {
     if (body->particles.size() == 0 || body->options.integrator == Integrator::explicit_step) return false;
-    if (body->options.integrator != Integrator::automatic) continue;
-    if (body->options.substeps != 0) return false;
     const Real limit = duration * std::sqrt(body->largest_eigenvalue) / 2;
-    const Real share = touches ? body->options.contact_safety : body->options.safety;
-    is_automatic = true;
-    pays = pays || limit > crossover_substeps * share;
     is_too_stiff = is_too_stiff || limit > body->options.max_substeps;
+    if (body->options.integrator == Integrator::automatic) {
+      if (body->options.substeps != 0) return false;
+      const Real share = touches ? body->options.contact_safety : body->options.safety;
+      is_automatic = true;
+      pays = pays || limit > crossover_substeps * body->options.implicit_order * share;
+    } else {
+      may_bounce = may_bounce && body->options.implicit_order == 2;
+    }
   }
-  return !is_automatic || (pays && (!touches || is_too_stiff || lies(island)));
+  if (is_automatic && !pays) return false;
+  return !touches || is_too_stiff || (!is_automatic && !may_bounce) || lies(island);
 }
 
 bool may_bounce(const RigidContact& contact, const Island& island) {

@@ -4,8 +4,7 @@
 
 namespace penalty {
 
-RigidState::RigidState(const PackedVectors& positions, const PackedVectors& velocities,
-                       std::span<const Real> inverse_masses) {
+RigidState::RigidState(const Positions& positions, const Positions& velocities, std::span<const Real> inverse_masses) {
   const Vector3 origin = positions.col(0).head<3>();  // digits are scarce far from the world's
   for (Eigen::Index i = 0; i < positions.cols(); ++i) {
     const Real m = 1 / inverse_masses[i];

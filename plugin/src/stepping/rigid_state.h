@@ -14,7 +14,7 @@ struct RigidState {
   RigidState() = default;
   explicit RigidState(const Particles& particles)
       : RigidState(particles.positions, particles.velocities, particles.inverse_masses) {}
-  RigidState(const PackedVectors& positions, const PackedVectors& velocities, std::span<const Real> inverse_masses);
+  RigidState(const Positions& positions, const Positions& velocities, std::span<const Real> inverse_masses);
 
   /// About a line that all particles are on there is no moment, and no inverse.
   Matrix3 inverse_inertia() const;

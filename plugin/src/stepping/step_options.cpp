@@ -31,6 +31,7 @@ void StepOptions::check() const {
   require(energy_tolerance > 0, "energy_tolerance", energy_tolerance, "positive");
   require(max_substeps >= 1, "max_substeps", max_substeps, "at least 1");
   require(contact_slop >= 0 && std::isfinite(contact_slop), "contact_slop", contact_slop, "zero or positive [m]");
+  require(implicit_order == 1 || implicit_order == 2, "implicit_order", implicit_order, "1 or 2");
   require(newton_iterations >= 1, "newton_iterations", newton_iterations, "at least 1");
   require(newton_tolerance > 0 && newton_tolerance < 1, "newton_tolerance", newton_tolerance, "in (0, 1)");
   linear.check("step");

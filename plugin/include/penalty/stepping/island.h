@@ -31,6 +31,12 @@ struct RememberedContact {
   Vector3 normal, force;         // [N]
 };
 
+/// What a body was given in the first of the two stages of an implicit step.
+struct FirstStage {
+  Vector3 impulse = Vector3::Zero(), moment = Vector3::Zero();  // from outside, gravity left out; about its centre
+  Real driving = 0, damping = 0;                                // work [J]
+};
+
 /// What implicit steps keep between steps.
 struct ImplicitState {
   NewtonBody newton;
@@ -40,10 +46,13 @@ struct ImplicitState {
   bool has_acceleration = false;
 
   // What the step works in: of the body,
-  Eigen::Index first = 0;  // column of its first particle among the unknowns of the island
+  Eigen::Index first = 0;  // its first column among the island's unknowns
+  FirstStage first_stage;
   // and of the island that it is the first body of.
   NewtonSolver solver;
-  PackedVectors from, guess;
+  PackedVectors from, velocities, guess;
+  PackedVectors base, carried;            // the step ends with velocities (x - base) / t, without forces `carried`
+  PackedVectors stage, stage_velocities;  // where the first of two ended
   std::vector<Real> enough;
   std::shared_ptr<ImplicitContactScratch> contact_scratch;
 };
