@@ -69,13 +69,15 @@ CommandLine parse(int argc, const char* const* argv) {
   RunOptions options;
   SceneOptions& scene = options.scene_options;
   std::string world = "classic", integrator = "auto", start, quality = "preview", backend = "auto", coloring, model;
-  std::optional<long long> seed, seeds, cells, phases, substeps, spheres;
+  std::optional<long long> seed, seeds, cells, order, phases, substeps, spheres;
   std::string out;
   bool no_render = false, no_scale = false;
 
   run->add_option("scene", options.scene, "One of the scenes of `penalty-demo list`")->required()->type_name("SCENE");
   run->add_option("--world", world, "Bullet's world: classic or deformable")->type_name("NAME");
   run->add_option("--integrator", integrator, "auto, explicit or implicit")->type_name("NAME");
+  run->add_option("--order", order, "Of implicit steps: 1 (backward Euler) or 2 (TR-BDF2 where nothing touches)")
+      ->type_name("N");
   run->add_option("--mesh", scene.mesh,
                   "Tetrahedra (.vtk, .vtu, .msh, .node/.ele), a surface (.obj, .stl, .ply), or bunny, torus, ball, box")
       ->type_name("FILE");
@@ -113,7 +115,7 @@ CommandLine parse(int argc, const char* const* argv) {
   run->add_flag("--no-render", no_render, "No pictures: needs no OpenGL");
   run->add_option("--summary", options.summary, "Where the summary goes as JSON; -: alone on standard output")
       ->type_name("FILE");
-  read_as_decimal(*run, {"--cells", "--stiffness", "--young", "--poisson", "--phases", "--damping", "--drag",
+  read_as_decimal(*run, {"--cells", "--stiffness", "--young", "--poisson", "--order", "--phases", "--damping", "--drag",
                          "--substeps", "--spheres", "--seed", "--seeds", "--rate", "--duration", "--still"});
 
   try {
@@ -153,6 +155,7 @@ CommandLine parse(int argc, const char* const* argv) {
   require_not_negative(options.still, "--still");
   num_steps(options.duration.value_or(find_scene(options.scene).duration), options.rate);
   scene.cells = whole(cells, "--cells", 1, 1000);
+  scene.order = whole(order, "--order", 1, 2);
   scene.phases = whole(phases, "--phases", 1, 2);
   scene.spheres = whole(spheres, "--spheres", 0, 1000);
   scene.substeps = whole(substeps, "--substeps", 0, 1000000);

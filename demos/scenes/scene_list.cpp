@@ -8,10 +8,10 @@ namespace penalty::demo {
 
 const std::vector<SceneEntry>& scenes() {
   static const std::vector<SceneEntry> list{
-      drop_scene,    beam_scene,    materials_scene,      flight_scene,  cloth_scene,           fold_scene,
-      balloon_scene, muscle_scene,  plastic_scene,        tear_scene,    user_constraint_scene, collide_scene,
-      stack_scene,   bowl_scene,    press_scene,          incline_scene, bounce_scene,          hand_scene,
-      cape_scene,    recover_scene, potential_field_scene};
+      drop_scene,    beam_scene,   materials_scene, flight_scene,         cloth_scene,           fold_scene,
+      balloon_scene, muscle_scene, plastic_scene,   tear_scene,           user_constraint_scene, collide_scene,
+      stack_scene,   bowl_scene,   press_scene,     incline_scene,        bounce_scene,          hand_scene,
+      cape_scene,    fork_scene,   recover_scene,   potential_field_scene};
   return list;
 }
 
@@ -61,6 +61,7 @@ StepOptions step_options(const SceneOptions& options, StepOptions by_default) {
   if (options.damping) by_default.damping_time = *options.damping;
   if (options.drag) by_default.drag = *options.drag;
   if (options.integrator) by_default.integrator = *options.integrator;
+  if (options.order) by_default.implicit_order = *options.order;
   if (options.substeps) by_default.substeps = *options.substeps;
   by_default.check();
   return by_default;

@@ -42,6 +42,7 @@ struct SceneOptions {
   std::optional<Real> drag{};           // [1/s]
   std::optional<int> substeps{};        // in a step; empty: from the stability limit
   std::optional<Integrator> integrator{};
+  std::optional<int> order{};  // of implicit steps
   std::optional<int> spheres{};
   std::optional<Start> start{};
   std::uint32_t seed = 1;

@@ -69,7 +69,7 @@ const SceneEntry& find_scene(std::string_view name);
 // One file each.
 extern const SceneEntry drop_scene, beam_scene, materials_scene, flight_scene, cloth_scene, fold_scene, balloon_scene,
     muscle_scene, plastic_scene, tear_scene, user_constraint_scene, collide_scene, stack_scene, bowl_scene, press_scene,
-    incline_scene, bounce_scene, hand_scene, cape_scene, recover_scene, potential_field_scene;
+    incline_scene, bounce_scene, hand_scene, cape_scene, fork_scene, recover_scene, potential_field_scene;
 
 /// The elastic part and the mass as the user wants them: one stiffness for all and 1 kg, or a material and a model of
 /// it.

@@ -16,7 +16,7 @@ SceneOptions coarse(std::string_view scene) {
   SceneOptions options;
   if (scene == "drop" || scene == "flight") options.mesh = "box";
   options.cells = scene == "beam" || scene == "cloth" || scene == "balloon" || scene == "tear" ? 8
-                  : scene == "materials"                                                       ? 16
+                  : scene == "materials" || scene == "fork"                                    ? 16
                   : scene == "muscle" || scene == "user_constraint"                            ? 12
                                                                                                : 4;
   return options;
@@ -46,6 +46,21 @@ TEST_P(Claims, ABoardOfTwoMaterialsSagsByWhatIsNextToTheWall) {
   // Tetrahedra four to the thickness are some tenth too stiff in bending; half a metre is more than small.
   EXPECT_NEAR(fact(*scene, "sag_of_the_hard_root") / sag(hard, soft), 0.9, 0.1);
   EXPECT_NEAR(fact(*scene, "sag_of_the_soft_root") / sag(soft, hard), 0.85, 0.1);
+}
+
+TEST_P(Claims, TheForkRingsAtItsPitchAsLongAsTheStepLetsIt) {
+  const auto run = [this](std::optional<int> order, std::optional<Integrator> integrator, Real rate) {
+    const auto scene = make("fork", {.cells = 16, .integrator = integrator, .order = order});
+    for (int step = 0; step < 5 * rate; ++step) scene->step(1 / rate);
+    return std::pair(fact(*scene, "pitch"), fact(*scene, "amplitude_kept"));
+  };
+  const auto [exact, kept_by_exact] = run({}, Integrator::explicit_step, 240);
+  EXPECT_GT(kept_by_exact, 0.9);
+  const auto [pitch, kept] = run({}, {}, 60);
+  EXPECT_NEAR(pitch, exact, 0.005 * exact);
+  EXPECT_GT(kept, 0.85);
+  const auto [low, left] = run(1, {}, 60);
+  EXPECT_LT(left, 0.1);
 }
 
 TEST_P(Claims, TheBalloonEnclosesItsTargetVolume) {

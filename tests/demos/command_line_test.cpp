@@ -25,7 +25,7 @@ TEST(CommandLine, RefusesWhatItDoesNotKnow) {
   for (const Misuse& misuse :
        {Misuse{"", "subcommand"}, Misuse{"run", "scene"}, Misuse{"run nothing", "drop, beam, materials, flight"},
         Misuse{"run drop --bogus", "--bogus"}, Misuse{"run drop --world moon", "classic, deformable"},
-        Misuse{"run drop --integrator rk4", "auto, explicit, implicit"},
+        Misuse{"run drop --integrator rk4", "auto, explicit, implicit"}, Misuse{"run drop --order 0", "must be 1 to 2"},
         Misuse{"run drop --phases 3", "must be 1 to 2"}, Misuse{"run drop --start upside", "scramble"},
         Misuse{"run drop --gl vulkan", "osmesa"}, Misuse{"run drop --quality ultra", "preview"},
         Misuse{"run drop --model clay", "springs, springs+areas, neo-hookean"},
