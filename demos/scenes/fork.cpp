@@ -104,7 +104,7 @@ SceneSetup setup(const SceneOptions& options, const BodyMesh& body) {
                        .pinned = mesh.vertex_set("stem")}),
       .step = step_options(options, {.integrator = Integrator::implicit_step, .implicit_order = 2}),
       .look = {.azimuth = 20, .elevation = 12}};
-  const std::vector<int> end = mesh.vertex_set("end");
+  const std::vector<int>& end = mesh.vertex_set("end");
   const auto ringing = std::make_shared<Ringing>(mesh.vertices(0, end).mean());
   setup.watch = [ringing, end](const SceneState& state) { ringing->see(state.time, state.x()(0, end).mean()); };
   setup.facts = [ringing](const SceneState&) -> std::vector<Fact> {
