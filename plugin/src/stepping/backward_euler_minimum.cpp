@@ -22,6 +22,8 @@ constexpr Real kept_stiffness = 0.005;  // motion that leaves the stiffness as i
 constexpr int oldest_stiffness = 4;     // iterations that it is kept
 constexpr Real slow_fall = 0.25;        // of the residual in an iteration: then the stiffness is assembled anew,
 constexpr Real still_slow = 2;          // unless it fell hardly faster when it was new
+constexpr Real surely_enough = 1e-6;    // of the residual that is: no linear solution is sought beyond
+constexpr Real loosest = 0.5;           // tolerance of it
 constexpr Real settled_gap = 1e-4;      // of what presses [m/s]
 constexpr Real sudden = 5;              // approach [speeds gained by gravity in a step] that is an impact
 
@@ -167,6 +169,7 @@ void BackwardEuler::begin_in_contact(ImplicitContacts& contacts) {
 void BackwardEuler::minimize_in_contact(ImplicitContacts& contacts) {
   find_enough();
   const int most = times_iterations * most_iterations_;
+  const Real tolerance = newton_.linear.tolerance;
   int since_update = 0, updates = 0, age = 0;
   Real fresh_fall = 0;
   bool is_fresh = true;  // linearised here
@@ -197,6 +200,8 @@ void BackwardEuler::minimize_in_contact(ImplicitContacts& contacts) {
       newton_.linearize();
     }
     is_fresh = false;
+    newton_.linear.tolerance =
+        contacts.were_predicted() ? tolerance : std::max(tolerance, std::min(loosest, std::sqrt(surely_enough / left)));
     const NewtonIteration iteration = newton_.descend();
     contacts.follow(iteration.length, newton_.direction(), newton_.positions());
     ++k;
@@ -208,6 +213,7 @@ void BackwardEuler::minimize_in_contact(ImplicitContacts& contacts) {
     if (contacts.is_cut()) take_surfaces(contacts);
     left = residual();
   }
+  newton_.linear.tolerance = tolerance;
 }
 
 }  // namespace penalty
