@@ -4,23 +4,7 @@
 namespace penalty::testing {
 namespace {
 
-Body implicit(Body body) {
-  body.body.options.integrator = Integrator::implicit_step;
-  return body;
-}
-
-/// A cube of 4 x 4 x 4 cells, 1 kg, with one stiffness for every element: stretched 1.6 times, drifting and turning.
-Body make_stretched_cube(Real stiffness) {
-  const TetMesh mesh = make_box({1, 1, 1}, {4, 4, 4});
-  const auto count = mesh.vertices.cols();
-  Body cube = implicit(make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, stiffness),
-                                 std::vector<Real>(static_cast<std::size_t>(count), static_cast<Real>(count))));
-  cube.particles().positions.row(0) *= 1.6;
-  for (int i = 0; i < count; ++i)
-    cube.set_velocity(i, Vector3(0.3, -0.2, 0.1) + Vector3(0.5, 1, -0.7).cross(cube.position(i)));
-  cube.body.positions_changed();
-  return cube;
-}
+Body make_stretched_cube(Real stiffness) { return implicit(testing::make_stretched_cube(stiffness, 1.6)); }
 
 /// `links` springs of 0.1 m, nodes of 2 g, hanging from a pin with 5 kg at the end.
 Body make_chain(int links, Real stiffness) {
@@ -195,12 +179,6 @@ TEST(ImplicitStep, PinnedParticlesStayAndDrivenOnesMove) {
 
 // The three things that a step sets after its minimum was found are not to be tested where they were set; what they
 // took is, and that it vanishes.
-Body converged(Body body) {
-  body.body.options.newton_tolerance = 1e-11;
-  body.body.options.newton_iterations = 60;
-  body.body.options.linear = {1000, 1e-10};
-  return body;
-}
 
 TEST(ImplicitStep, GivesBackNoLinearMomentumWhenNewtonConverges) {
   Body loose = make_stretched_cube(1e4), tight = converged(make_stretched_cube(1e4));

@@ -31,6 +31,30 @@ Body make_beam_body(int cells_across, const Material& material) {
                    std::vector<Real>(num_particles, static_cast<Real>(num_particles) / 4000));
 }
 
+Body make_stretched_cube(Real stiffness, Real stretch) {
+  const TetMesh mesh = make_box({1, 1, 1}, {4, 4, 4});
+  const auto count = mesh.vertices.cols();
+  Body cube = make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, stiffness),
+                        std::vector<Real>(static_cast<std::size_t>(count), static_cast<Real>(count)));
+  cube.particles().positions.row(0) *= stretch;
+  for (int i = 0; i < count; ++i)
+    cube.set_velocity(i, Vector3(0.3, -0.2, 0.1) + Vector3(0.5, 1, -0.7).cross(cube.position(i)));
+  cube.body.positions_changed();
+  return cube;
+}
+
+Body implicit(Body body) {
+  body.body.options.integrator = Integrator::implicit_step;
+  return body;
+}
+
+Body converged(Body body) {
+  body.body.options.newton_tolerance = 1e-11;
+  body.body.options.newton_iterations = 60;
+  body.body.options.linear = {1000, 1e-10};
+  return body;
+}
+
 Body make_free_particles(const Eigen::Matrix3Xd& positions, std::vector<Real> masses) {
   for (Real& m : masses) m = 1 / m;
   return make_body(PotentialField(positions), std::move(masses));

@@ -33,6 +33,13 @@ Body make_body(PotentialField field, std::vector<Real> inverse_masses);
 /// The beam 4 x 1 x 1 m of `cells_across` cells, equal masses that sum to 4000 kg.
 Body make_beam_body(int cells_across, const Material& material = {.young = 1e6, .poisson = 0.4});
 
+/// A cube of 4 x 4 x 4 cells, 1 kg, with one stiffness for every element: stretched along x, drifting and turning.
+Body make_stretched_cube(Real stiffness, Real stretch);
+
+/// To be stepped implicitly; and by iterations that go on until nothing is left.
+Body implicit(Body body);
+Body converged(Body body);
+
 /// Particles without forces between them.
 Body make_free_particles(const Eigen::Matrix3Xd& positions, std::vector<Real> masses);
 

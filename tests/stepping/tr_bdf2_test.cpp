@@ -6,31 +6,12 @@ namespace penalty::testing {
 namespace {
 
 Body second_order(Body body) {
-  body.body.options.integrator = Integrator::implicit_step;
   body.body.options.implicit_order = 2;
   body.body.options.settling_speed = 0;
-  return body;
+  return implicit(std::move(body));
 }
 
-Body precise(Body body) {
-  body.body.options.newton_tolerance = 1e-10;
-  body.body.options.newton_iterations = 60;
-  body.body.options.linear = {1000, 1e-10};
-  return body;
-}
-
-/// A cube of 4 x 4 x 4 cells, 1 kg: stretched 1.3 times, drifting and turning.
-Body make_pulled_cube(Real stiffness) {
-  const TetMesh mesh = make_box({1, 1, 1}, {4, 4, 4});
-  const auto count = mesh.vertices.cols();
-  Body cube = second_order(make_body(make_elastic_field(mesh.vertices, mesh.tetrahedra, stiffness),
-                                     std::vector<Real>(static_cast<std::size_t>(count), static_cast<Real>(count))));
-  cube.particles().positions.row(0) *= 1.3;
-  for (int i = 0; i < count; ++i)
-    cube.set_velocity(i, Vector3(0.3, -0.2, 0.1) + Vector3(0.5, 1, -0.7).cross(cube.position(i)));
-  cube.body.positions_changed();
-  return cube;
-}
+Body make_pulled_cube(Real stiffness) { return second_order(make_stretched_cube(stiffness, 1.3)); }
 
 /// A bar of 4 x 1 x 1 m, 4000 kg, that is clamped at one end and leaves its shape at rest nearly in its first mode.
 Body make_clamped_bar(Real stiffness) {
@@ -87,7 +68,7 @@ TEST(TrBdf2, OfASpringAlongItsAxisIsTheRationalFunctionOfItsStages) {
       PotentialField field(rest);
       const std::vector<Edge> edge{{0, 1}};
       field.add<Length>(edge, stiffness);
-      Body spring = precise(second_order(make_body(std::move(field), {0, 1 / mass})));
+      Body spring = converged(second_order(make_body(std::move(field), {0, 1 / mass})));
       spring.body.options.damping_time = damping_time;
       Real d = 0.02, u = 0.3 / std::max<Real>(1, wh);  // so that it does not turn over
       spring.set_position(1, (length + d) * axis);
@@ -113,7 +94,7 @@ TEST(TrBdf2, OfASpringAlongItsAxisIsTheRationalFunctionOfItsStages) {
 
 TEST(TrBdf2, ConvergesToTheExplicitOneWithTheSquareOfTheRate) {
   const auto run = [](Integrator integrator, int rate) {
-    Body cube = precise(make_pulled_cube(0.05));
+    Body cube = converged(make_pulled_cube(0.05));
     cube.body.options.integrator = integrator;
     cube.body.options.substeps = 40;
     for (int step = 0; step < rate / 10; ++step) advance(cube, 1.0 / rate);
@@ -193,7 +174,7 @@ TEST(TrBdf2, FallsAlongTheParabola) {
 TEST(TrBdf2, HangsOnASpringFromTheWorldAsItWouldInSmallSteps) {
   // Free, but not alone: its momenta are what the spring to a fixed point gives them.
   const auto run = [](Integrator integrator, int rate) {
-    Body cube = precise(make_pulled_cube(10));
+    Body cube = converged(make_pulled_cube(10));
     cube.particles().positions = cube.field->rest_positions();
     const std::vector<std::array<int, 1>> corner{{124}};
     cube.field->add(Distance::pinned(cube.position(124) + Vector3(0.1, 0.2, 0), 1), corner, 20.0);
@@ -211,7 +192,7 @@ TEST(TrBdf2, HangsOnASpringFromTheWorldAsItWouldInSmallSteps) {
 }
 
 TEST(TrBdf2, WhoDrivesAPinnedEndPaysForWhatTheBodyGets) {
-  Body bar = precise(make_clamped_bar(6e4));
+  Body bar = converged(make_clamped_bar(6e4));
   bar.particles().velocities.setZero();
   std::vector<int> pinned;
   for (int i = 0; i < bar.particles().size(); ++i)
