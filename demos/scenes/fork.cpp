@@ -14,7 +14,8 @@ constexpr int cells_across = 8;                                                 
 constexpr Material rubber{.young = 2e7, .poisson = 0.4, .density = 1000};
 constexpr Real struck = 1.5;  // speed of the ends [m/s]
 
-TetMesh without_vertices_of_none(const TetMesh& mesh, const std::vector<std::array<int, 4>>& tetrahedra) {
+/// Some of the tetrahedra, with the vertices that these have.
+TetMesh cut_from(const TetMesh& mesh, const std::vector<std::array<int, 4>>& tetrahedra) {
   std::vector<int> number(static_cast<std::size_t>(mesh.vertices.cols()), -1);
   for (const auto& tetrahedron : tetrahedra)
     for (const int v : tetrahedron) number[v] = 0;
@@ -44,7 +45,7 @@ BodyMesh body(const SceneOptions& options) {
     const bool is_prong = middle.y() > height - prong_height, is_stem = middle.y() < stem_height;
     if (is_prong ? !is_inside : is_inside || !is_stem) tetrahedra.push_back(tetrahedron);
   }
-  TetMesh mesh = without_vertices_of_none(block, tetrahedra);
+  TetMesh mesh = cut_from(block, tetrahedra);
   mesh.vertex_sets = {{"stem", {}}, {"end", {}}};
   for (int v = 0; v < mesh.vertices.cols(); ++v) {
     if (mesh.vertices(1, v) < 1e-9) mesh.vertex_sets[0].members.push_back(v);

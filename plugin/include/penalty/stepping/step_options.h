@@ -7,8 +7,8 @@ namespace penalty {
 enum class Integrator {
   automatic,  // explicit up to `crossover_substeps`, else implicit; in contact only what lies, or is too stiff to bounce
   explicit_step,  // sub-cycled velocity Verlet
-  implicit_step,  // backward Euler (see implicit_order), with what it touches; explicit where that is edges that are driven or spin, a rigid body
-  // that is jointed, held along an axis or rebounds, or a soft one that is explicit, where surfaces cross
+  implicit_step,  // see implicit_order; with what it touches, but explicit where that is edges that are driven or spin,
+  // a rigid body that is jointed, held along an axis or rebounds, or a soft one that is explicit, where surfaces cross
   // from the start, and in couplings
 };
 
